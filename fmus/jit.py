@@ -1,0 +1,45 @@
+"""How kernels are compiled.
+
+A *kernel* is a plain loop over ``float64`` arrays that are passed in, workspaces too: no exceptions, no
+allocation in the step path, an integer status returned. Compiled code is cached on disk, in a folder named
+after the hash of every source file of the package: Numba itself looks only at the file of the kernel called,
+so that a change in a kernel *called by it* would otherwise go on running the old code.
+"""
+
+from __future__ import annotations
+
+import hashlib
+import os
+import tempfile
+from pathlib import Path
+
+import numba
+
+PACKAGE = Path(__file__).resolve().parent
+
+
+def source_hash(package: Path = PACKAGE) -> str:
+    """Return a hash of all Python sources below `package` (16 hexadecimal digits)."""
+    digest = hashlib.sha256()
+    for path in sorted(package.rglob("*.py")):
+        digest.update(path.relative_to(package).as_posix().encode())
+        digest.update(path.read_bytes())
+    return digest.hexdigest()[:16]
+
+
+def _cache_folder() -> Path:
+    for base in (PACKAGE / "__pycache__", Path.home() / ".cache" / "line-landing", Path(tempfile.gettempdir())):
+        folder = base / f"numba-{source_hash()}"
+        try:
+            folder.mkdir(parents=True, exist_ok=True)
+        except OSError:
+            continue
+        if os.access(folder, os.W_OK):
+            return folder
+    raise OSError("no folder can be written for compiled kernels; make the home folder writable")
+
+
+numba.config.CACHE_DIR = str(_cache_folder())  # type: ignore[attr-defined]
+
+kernel = numba.njit(cache=True, error_model="numpy")
+"""Decorator of every kernel."""

@@ -1,0 +1,1 @@
+"""Scenario, graph, masters, reference, results: everything above the modules."""
