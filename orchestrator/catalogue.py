@@ -5,7 +5,7 @@ from __future__ import annotations
 import tomllib
 from pathlib import Path
 
-from orchestrator import vocabulary
+from orchestrator.robots import catalogue
 
 
 def scenarios(folder: Path) -> dict[str, str]:
@@ -15,7 +15,7 @@ def scenarios(folder: Path) -> dict[str, str]:
 
 def robots() -> dict[str, str]:
     """Return the titles of the robots of the catalogue by name."""
-    return {path.stem: _title(path) for path in vocabulary.robot_files()}
+    return {name: robot.title for name, robot in catalogue().items()}
 
 
 def masters() -> dict[str, str]:

@@ -10,10 +10,10 @@ import sys
 from collections.abc import Callable, Iterator
 from contextlib import contextmanager
 from pathlib import Path
-from typing import TYPE_CHECKING, Annotated
+from typing import TYPE_CHECKING, Annotated, Any
 
-import click
 import typer
+from typer.core import TyperGroup
 
 from orchestrator.errors import DONE, FAILED, INTERRUPTED, MISSED, InputError, OrchestratorError
 
@@ -22,7 +22,25 @@ if TYPE_CHECKING:
     from orchestrator.experiment import Coupled
     from orchestrator.scenario import Scenario
 
+
+class Commands(TyperGroup):
+    """The commands; what they raise for the user ends in a message and an exit status, not in a traceback."""
+
+    def invoke(self, ctx: Any) -> Any:
+        """Carry out one command."""
+        try:
+            return super().invoke(ctx)
+        except OrchestratorError as error:
+            for line in str(error).splitlines():
+                _complain(line)
+            raise typer.Exit(error.exit_status) from None
+        except KeyboardInterrupt:
+            _complain("interrupted")
+            raise typer.Exit(INTERRUPTED) from None
+
+
 app = typer.Typer(
+    cls=Commands,
     add_completion=False,
     no_args_is_help=True,
     pretty_exceptions_enable=False,
@@ -53,7 +71,7 @@ Quiet = Annotated[bool, typer.Option("--quiet", help="No progress.")]
 @app.command()
 def build(out: Annotated[Path, typer.Option(help="Folder of the FMUs.")] = Path("fmu")) -> None:
     """Build the FMUs of cable, contact and every robot of the catalogue."""
-    from fmus.build import build_all
+    from orchestrator.library import build_all
 
     for path in build_all(out):
         print(path)
@@ -339,17 +357,9 @@ def _complain(message: str) -> None:
 
 
 def main(arguments: list[str] | None = None) -> None:
-    """Run the command line and end the process with its exit status, never with a traceback of ours."""
-    try:
-        status = app(arguments, standalone_mode=False)
-    except OrchestratorError as error:
-        for line in str(error).splitlines():
-            _complain(line)
-        status = error.exit_status
-    except click.ClickException as error:
-        error.show()
-        status = error.exit_code
-    except (click.Abort, KeyboardInterrupt):
-        _complain("interrupted")
-        status = INTERRUPTED
-    sys.exit(status or DONE)
+    """Run the command line and end the process with its exit status."""
+    app(arguments)
+
+
+if __name__ == "__main__":
+    main()

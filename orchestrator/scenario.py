@@ -423,7 +423,7 @@ def _component_problems(
 ) -> Iterator[Problem]:
     fmu = section.get("fmu")
     try:
-        known = vocabulary.of_fmu(Path(fmu)) if isinstance(fmu, str) else vocabulary.of_module(kind)
+        known = vocabulary.of_fmu(Path(fmu)) if isinstance(fmu, str) else _own(kind, section)
     except InputError as error:
         yield from (Problem(f"{path}.fmu", problem) for problem in error.problems)
         return
@@ -438,6 +438,11 @@ def _component_problems(
             yield from _value_problems(place, known[name], value)
             yield from _unit_problems(place, provenance, known[name].unit)
             yield from _bound_problems(place, kind, name, value)
+
+
+def _own(kind: str, section: Document) -> dict[str, vocabulary.Variable]:
+    """Return the variables of our own module; a general graph has none (its missing `fmu` is reported)."""
+    return vocabulary.of_module(kind, section.get("model")) if kind else {}
 
 
 def _value_problems(path: str, variable: vocabulary.Variable, value: Any) -> Iterator[Problem]:
@@ -484,9 +489,8 @@ def _choice_problems(document: Document) -> Iterator[Problem]:
 def _position_problems(document: Document) -> Iterator[Problem]:
     position = _table(document, "landing").get("position")
     span = _table(_table(document, "cable"), "parameters").get("span")
-    if span is None and isinstance(document.get("cable"), dict):
-        default = vocabulary.of_module("cable").get("span")
-        span = default.start if default else None
+    if span is None and "fmu" not in _table(document, "cable"):
+        span = vocabulary.of_module("cable")["span"].start
     if isinstance(position, int | float) and isinstance(span, int | float) and not 0 < position < span:
         yield Problem(
             "landing.position", f"{position:g} m is off the span; it must lie within 0 … {span:g} m"

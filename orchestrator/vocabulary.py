@@ -3,8 +3,6 @@
 from __future__ import annotations
 
 import zipfile
-from functools import cache
-from importlib import import_module
 from inspect import signature
 from pathlib import Path
 from typing import Any
@@ -12,11 +10,6 @@ from typing import Any
 from fmus.variables import Kind, Variable
 from orchestrator.errors import InputError
 
-MODULES = {
-    "cable": ("fmus.cable.module", "Cable"),
-    "robot": ("fmus.robot.module", "Robot"),
-    "contact": ("fmus.contact.module", "Contact"),
-}
 KINDS: dict[str, Kind] = {"Real": "real", "Float64": "real", "Float32": "real", "Boolean": "boolean"}
 KINDS |= {
     "String": "string",
@@ -27,11 +20,28 @@ KINDS |= {
 }
 
 
-@cache
-def of_module(kind: str) -> dict[str, Variable]:
-    """Return the variables of our own module `kind` by name, from its table."""
-    file, name = MODULES[kind]
-    return {v.name: v for v in getattr(import_module(file), name).table.variables}
+def of_module(kind: str, robot: str | None = None) -> dict[str, Variable]:
+    """Return the variables of our own module by name, from its table.
+
+    Parameters
+    ----------
+    kind : ``cable``, ``contact`` or ``robot``
+    robot : name of the catalogue; the number of its wheels decides which variables there are
+    """
+    if kind == "cable":
+        from fmus.cable.module import Cable
+
+        table = Cable.table
+    elif kind == "contact":
+        from fmus.contact.module import Contact
+
+        table = Contact.table
+    else:
+        from fmus.robot.module import robot_table
+        from orchestrator.robots import load_robot
+
+        table = robot_table(load_robot(robot).n_wheels if robot in robots() else 1)
+    return {v.name: v for v in table.variables}
 
 
 def of_fmu(path: Path) -> dict[str, Variable]:
@@ -77,13 +87,8 @@ def _options(master: type) -> list[str]:
     return [p.name for p in parameters if p.kind in (p.KEYWORD_ONLY, p.POSITIONAL_OR_KEYWORD)]
 
 
-def robot_files() -> list[Path]:
-    """Return the files of the robots of the catalogue."""
-    import fmus
-
-    return sorted((Path(fmus.__file__).parent / "robot" / "catalogue").glob("*.toml"))
-
-
 def robots() -> list[str]:
     """Return the names of the robots of the catalogue."""
-    return [path.stem for path in robot_files()]
+    from orchestrator.robots import FOLDER
+
+    return sorted(path.stem for path in FOLDER.glob("*.toml"))
