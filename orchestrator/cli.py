@@ -100,9 +100,9 @@ def list_() -> None:
 @app.command()
 def validate(scenario: ScenarioFile, robot: Robot = None, set_: Set = None) -> None:
     """Parse, load, check connections, units and contract; nothing is run."""
+    loaded = _load(scenario, robot, set_)
     from orchestrator import experiment
 
-    loaded = _load(scenario, robot, set_)
     with experiment.opened(loaded) as graph:
         print(f"{scenario}: valid; {len(graph.components)} FMUs, {len(graph.connections)} connections")
 
@@ -257,14 +257,16 @@ def _task(scenario: Scenario) -> str:
 
 def _status(runs: list[Coupled], within: bool) -> int:
     """Return the exit status, and say on stderr what failed."""
+    from orchestrator.experiment import Interruption
+
+    status = DONE if within else MISSED
     for coupled in runs:
         for contact in coupled.fallen:
             _complain(f"{contact}: the cable left the groove; the robot has fallen off")
         if coupled.log.error is not None:
-            _complain(f"{_task(coupled.scenario)}: {coupled.log.error}; results up to there are kept")
-    if any(coupled.log.error is not None for coupled in runs):
-        return FAILED
-    return DONE if within else MISSED
+            _complain(f"{coupled.label}: {coupled.log.error}; the results up to there are kept")
+            status = INTERRUPTED if isinstance(coupled.log.error, Interruption) else FAILED
+    return status
 
 
 def _print_run(coupled: Coupled) -> None:
@@ -279,7 +281,7 @@ def _print_run(coupled: Coupled) -> None:
         table.add_row(panel.signal, panel.unit, *(f"{number:.5g}" for number in numbers))
     _print(table)
     print(
-        f"{log.master}, macro step {log.macro_step:g} s: {len(log.steps)} steps, "
+        f"{coupled.master}, macro step {log.macro_step:g} s: {len(log.steps)} steps, "
         f"{log.iterations_per_step:.2f} iterations a step, {log.unconverged} unconverged, {log.wall:.2f} s"
     )
 

@@ -3,6 +3,7 @@
 from __future__ import annotations
 
 import re
+import signal
 from collections.abc import Callable, Iterable, Iterator, Mapping
 from contextlib import contextmanager
 from dataclasses import dataclass, field
@@ -24,7 +25,7 @@ from orchestrator.compare import (
 from orchestrator.errors import InputError, RunError
 from orchestrator.fmu import Fmu, FmuError
 from orchestrator.graph import Connection, Graph, GraphError
-from orchestrator.masters import MASTERS
+from orchestrator.masters import MASTERS, StepReport
 from orchestrator.report import Record, draw_comparison, draw_run, run_label
 from orchestrator.results import RunDirectory, Table
 from orchestrator.scenario import Scenario
@@ -75,6 +76,16 @@ class Coupled:
             "power_residual",
         )
         return {name: np.array([getattr(step, name) for step in steps]) for name in names}
+
+    @property
+    def master(self) -> str:
+        """The master by its name."""
+        return self.scenario.simulation.master
+
+    @property
+    def label(self) -> str:
+        """Master and macro step, as legends and folders show them."""
+        return run_label(self.master, self.log.macro_step)
 
     @property
     def record(self) -> Record:
@@ -140,32 +151,71 @@ def _connection(text: str) -> Connection:
     return Connection(source, target)
 
 
-def run(scenario: Scenario, progress: Progress | None = None) -> Coupled:
+class Interruption(FmuError):
+    """Ctrl-C: ends a run at a communication point, so that its results so far are kept."""
+
+    def __init__(self, time: float):
+        super().__init__("run", time, 0, "interrupted")
+
+    def __str__(self) -> str:
+        return f"interrupted at t = {self.time:g} s"
+
+
+@contextmanager
+def interruptible() -> Iterator[Callable[[float], None]]:
+    """Give what a run calls at each communication point; it raises `Interruption` after Ctrl-C.
+
+    A second Ctrl-C ends the program at once.
+    """
+    asked: list[int] = []
+    before = signal.getsignal(signal.SIGINT)
+
+    def ask(number: int, _: Any) -> None:
+        asked.append(number)
+        signal.signal(signal.SIGINT, before)
+
+    def check(time: float) -> None:
+        if asked:
+            raise Interruption(time)
+
+    signal.signal(signal.SIGINT, ask)
+    try:
+        yield check
+    finally:
+        signal.signal(signal.SIGINT, before)
+
+
+def run(scenario: Scenario, progress: Progress = lambda _: None) -> Coupled:
     """Run the scenario coupled. A failure in mid-run does not raise: `log.error` says it."""
-    simulation = scenario.simulation
     with opened(scenario) as graph:
-        try:
-            master = MASTERS[simulation.master](graph, **scenario.master)
-            log = simulate(
-                graph,
-                master,
-                0.0,
-                simulation.stop_time,
-                simulation.macro_step,
-                record=recorded(graph),
-                on_step=(lambda report: progress(report.time)) if progress else None,
-            )
-        except (ValueError, TypeError) as error:
-            raise InputError(f"{scenario.path}: {error}") from None
-        except FmuError as error:
-            raise RunError(str(error), error.time) from None
+        log = _simulated(scenario, graph, progress)
         fmus = {n: {"file": str(f.path), "sha256": f.sha256} for n, f in graph.components.items()}
+    if log.error is not None and len(log.time) < 2:
+        raise RunError(str(log.error), 0.0)
     coupled = Coupled(scenario, exchange_of(scenario) if scenario.is_landing else "", log, fmus)
     if scenario.is_landing:
         from orchestrator import landing
 
         coupled.fields = landing.cable_fields(scenario, coupled.table)
     return coupled
+
+
+def _simulated(scenario: Scenario, graph: Graph, progress: Progress) -> Log:
+    simulation = scenario.simulation
+    with interruptible() as check:
+
+        def on_step(report: StepReport) -> None:
+            progress(report.time)
+            check(report.time)
+
+        try:
+            master = MASTERS[simulation.master](graph, **scenario.master)
+            times = 0.0, simulation.stop_time, simulation.macro_step
+            return simulate(graph, master, *times, record=recorded(graph), on_step=on_step)
+        except (ValueError, TypeError) as error:
+            raise InputError(f"{scenario.path}: {error}") from None
+        except FmuError as error:
+            raise RunError(str(error), error.time) from None
 
 
 def recorded(graph: Graph) -> list[str]:
@@ -188,7 +238,7 @@ def _only_couples(name: str, contacts: int) -> bool:
 
 
 def reference(
-    scenario: Scenario, macro_steps: Iterable[float], progress: Progress | None = None
+    scenario: Scenario, macro_steps: Iterable[float], progress: Progress = lambda _: None
 ) -> Reference:
     """Return the reference at the communication points of all `macro_steps`."""
     steps = list(macro_steps)
@@ -206,15 +256,15 @@ def _monolithic_reference(scenario: Scenario, times: np.ndarray) -> Reference:
     return Reference("monolithic", table, solution.wall_s, dict(solution.estimated_error))
 
 
-def _fine_reference(scenario: Scenario, macro_steps: list[float], progress: Progress | None) -> Reference:
+def _fine_reference(scenario: Scenario, macro_steps: list[float], progress: Progress) -> Reference:
     """Return the same graph at a much smaller macro step; its error is taken from one twice as large."""
     common = common_divisor(macro_steps)
     fine, coarse = (_completed(scenario.changed(macro_step=common / n), progress) for n in (8, 4))
-    kind = f"coupled, {fine.log.master}, macro step {fine.log.macro_step:g} s"
+    kind = f"coupled, {fine.master}, macro step {fine.log.macro_step:g} s"
     return Reference(kind, fine.table, fine.log.wall, dict(largest_difference(coarse.table, fine.table)))
 
 
-def _completed(scenario: Scenario, progress: Progress | None) -> Coupled:
+def _completed(scenario: Scenario, progress: Progress) -> Coupled:
     coupled = run(scenario, progress)
     if coupled.log.error is not None:
         raise RunError(str(coupled.log.error), coupled.log.error.time)
@@ -232,7 +282,7 @@ def held_against(coupled: Coupled, reference: Reference) -> Run:
     """Return the errors and the cost of one coupled run."""
     log = coupled.log
     return Run(
-        master=log.master,
+        master=coupled.master,
         macro_step=log.macro_step,
         steps=len(log.steps),
         iterations_per_step=log.iterations_per_step,
@@ -252,7 +302,7 @@ def summary(coupled: Coupled) -> dict[str, Any]:
         "title": scenario.title,
         "stiffness_set": scenario.cable.stiffness_set if scenario.cable else None,
         "robot": scenario.robot.model or scenario.robot.fmu if scenario.robot else None,
-        "master": log.master,
+        "master": coupled.master,
         "exchange": coupled.exchange or None,
         "macro_step": log.macro_step,
         "simulated_s": simulated,
