@@ -243,17 +243,21 @@ def reference(
     """Return the reference at the communication points of all `macro_steps`."""
     steps = list(macro_steps)
     if scenario.is_landing:
-        return _monolithic_reference(scenario, communication_times(scenario.simulation.stop_time, steps))
+        from orchestrator import landing
+
+        if landing.has_monolithic(scenario):
+            times = communication_times(scenario.simulation.stop_time, steps)
+            return _monolithic_reference(scenario, times, progress)
     return _fine_reference(scenario, steps, progress)
 
 
-def _monolithic_reference(scenario: Scenario, times: np.ndarray) -> Reference:
+def _monolithic_reference(scenario: Scenario, times: np.ndarray, progress: Progress) -> Reference:
     from orchestrator import landing, monolithic
 
-    tolerance = min(scenario.simulation.tolerances.values(), default=1e-4)
-    solution = monolithic.solve(landing.problem(scenario), scenario.simulation.stop_time, times, tolerance)
+    solution = monolithic.solve(lambda: landing.problem(scenario), times, progress=progress)
     table = {"time": times, **solution.signals}
-    return Reference("monolithic", table, solution.wall_s, dict(solution.estimated_error))
+    fields = landing.cable_fields(scenario, table)
+    return Reference("monolithic", table, solution.wall_s, dict(solution.estimated_error), fields)
 
 
 def _fine_reference(scenario: Scenario, macro_steps: list[float], progress: Progress) -> Reference:
