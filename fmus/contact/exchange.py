@@ -10,6 +10,7 @@ from __future__ import annotations
 import math
 
 import numpy as np
+from numpy.polynomial import legendre
 
 from fmus.contact.law import LEFT, OK, SLIP, axle, foot, friction, lateral, walls
 from fmus.jit import kernel
@@ -53,12 +54,14 @@ def gauss_rule(n: int) -> tuple[np.ndarray, np.ndarray, np.ndarray]:
     nodes, weights : (n,)
     increments : (n + 1, n); row i integrates the interpolating polynomial from node i - 1 (or 0) to node i (or 1)
     """
-    x, w = np.polynomial.legendre.leggauss(n)
-    nodes, weights = 0.5 * (x + 1.0), 0.5 * w
-    powers = np.arange(1, n + 1)
-    ends = np.concatenate([nodes, [1.0]])
-    integrals = (ends[:, None] ** powers / powers) @ np.linalg.inv(nodes[:, None] ** (powers - 1))
-    return nodes, weights, np.diff(integrals, axis=0, prepend=0.0)
+    x, w = legendre.leggauss(n)
+    ends = np.append(x, 1.0)
+    # the interpolant in Legendre polynomials, integrated from -1 by (2k + 1) int P_k = P_{k+1} - P_{k-1}
+    antiderivative = legendre.legvander(ends, n)[:, 1:]
+    antiderivative[:, 1:] -= legendre.legvander(ends, n - 2)
+    antiderivative[:, 0] += 1.0
+    integrals = 0.25 * antiderivative @ (legendre.legvander(x, n - 1).T * w)
+    return 0.5 * (x + 1.0), 0.5 * w, np.diff(integrals, axis=0, prepend=0.0)
 
 
 @kernel
