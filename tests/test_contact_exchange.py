@@ -5,6 +5,7 @@ import math
 import numpy as np
 import pytest
 from scipy.integrate import solve_ivp
+from scipy.optimize import brentq
 from scipy.spatial.transform import Rotation
 
 from fmus.contact import exchange
@@ -270,6 +271,34 @@ def test_interface_keeps_energy_over_many_steps():
     assert kinetic + potential + walls == pytest.approx(thrown, rel=2e-5)
     assert read(contact, "work_wheel") == pytest.approx(kinetic + potential - thrown, abs=1e-8 * thrown)
     assert read(contact, "dissipated_energy") == pytest.approx(0.0, abs=1e-12)
+
+
+def bounce(h, speed):
+    """Drop 38 kg at `speed` from 0.1 mm above a point contact; return the contact and the speed of departure."""
+    contact = seated(-1e-4, max_contact_length=1e-7, friction_coefficient=0.0)
+    contact.state[20] = -speed
+    x, v, find, steps = SEAT + 1e-4, -speed, np.zeros(2), 0
+    while x < SEAT or steps < 2:
+        x, v = coupled_step(contact, x, v, h, 38.0, 0.0, find)
+        steps += 1
+        assert steps < 100
+    return contact, v
+
+
+def test_bounce_through_the_exchange_has_order_4_and_balanced_books():
+    """Hunt-Crossley: E v - ln(1 + E v), E = D sin(theta/2), is the same before and after, for any exponent."""
+    speed = 0.5
+    before = SIN * speed - math.log(1 + SIN * speed)
+    exact = brentq(lambda v: -SIN * v - math.log(1 - SIN * v) - before, 1e-9, speed)
+    errors = []
+    for h in (4e-3, 2e-3):
+        contact, v = bounce(h, speed)
+        lost = 0.5 * 38.0 * (speed**2 - v**2)
+        errors.append(abs(v / exact - 1.0))
+        assert read(contact, "work_wheel") == pytest.approx(-lost, rel=1e-11)
+        assert read(contact, "dissipated_energy") == pytest.approx(lost, rel=1e-6)
+    assert errors[1] < 2e-6
+    assert math.log2(errors[0] / errors[1]) == pytest.approx(4.0, abs=0.2)
 
 
 def slide(contact, way, steps, h=1e-3, direction=(0.0, 1.0, 0.0)):
