@@ -274,7 +274,7 @@ def test_interface_keeps_energy_over_many_steps():
 
 
 def bounce(h, speed):
-    """Drop 38 kg at `speed` from 0.1 mm above a point contact; return the contact and the speed of departure."""
+    """Drop 38 kg at `speed` from 0.1 mm above a point contact; return it and the speed of departure."""
     contact = seated(-1e-4, max_contact_length=1e-7, friction_coefficient=0.0)
     contact.state[20] = -speed
     x, v, find, steps = SEAT + 1e-4, -speed, np.zeros(2), 0
@@ -286,7 +286,7 @@ def bounce(h, speed):
 
 
 def test_bounce_through_the_exchange_has_order_4_and_balanced_books():
-    """Hunt-Crossley: E v - ln(1 + E v), E = D sin(theta/2), is the same before and after, for any exponent."""
+    """Hunt-Crossley: E v - ln(1 + E v), E = D sin(theta/2), is the same before and after, any n."""
     speed = 0.5
     before = SIN * speed - math.log(1 + SIN * speed)
     exact = brentq(lambda v: -SIN * v - math.log(1 - SIN * v) - before, 1e-9, speed)
