@@ -84,7 +84,7 @@ class Coupled:
 
     @property
     def label(self) -> str:
-        """Master and macro step, as legends and folders show them."""
+        """Master and macro step, as folders are called."""
         return run_label(self.master, self.log.macro_step)
 
     @property
@@ -367,7 +367,7 @@ def write_comparison(directory: RunDirectory, comparison: Comparison, runs: list
     if reference.fields:
         directory.write_fields("reference.h5", reference.fields, FIELD_UNITS)
     for coupled in runs:
-        write(RunDirectory(directory.path / coupled.record.label), coupled, reference)
+        write(RunDirectory(directory.path / coupled.label), coupled, reference)
     directory.write_json("comparison.json", comparison.content())
     draw_comparison(directory.path, comparison, [coupled.record for coupled in runs])
     error = "; ".join(failures) or None

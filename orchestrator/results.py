@@ -121,7 +121,7 @@ def read_fields(path: Path) -> dict[str, np.ndarray]:
     import h5py
 
     with h5py.File(path) as file:
-        return {key: np.asarray(file[key]) for key in file}
+        return {str(key): np.asarray(file[key]) for key in file}
 
 
 def circumstances() -> dict[str, Any]:
