@@ -49,7 +49,8 @@ class Variable:
     feedthrough: tuple[str, ...] = ()
 
     def encode(self, value: Value) -> float:
-        """Return `value` as the number kept in the flat array; raise `ModuleError` if it has no place there."""
+        """Return `value` as the number kept in the flat array; raise `ModuleError` if it has no place
+        there."""
         if self.kind != "string":
             return float(value)
         if value not in self.choices:

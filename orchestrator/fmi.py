@@ -1,0 +1,239 @@
+"""The FMI calls of one instance, the same for FMI 2.0 and FMI 3.0.
+
+FMPy loads the library and knows the signatures; the calls that are made in every macro step go past it, with
+addresses converted once. Every call here returns the FMI status (0 ok, 1 warning, 2 discard, 3 error, 4
+fatal).
+"""
+
+from __future__ import annotations
+
+import ctypes
+from collections.abc import Callable
+from ctypes import CFUNCTYPE, byref, c_bool, c_char_p, c_double, c_int, c_size_t, c_void_p
+from functools import partial
+from pathlib import Path
+from typing import Any, ClassVar
+
+import numpy as np
+from fmpy import calloc, free
+from fmpy.fmi1 import FMICallException
+from fmpy.fmi2 import (
+    FMU2Slave,
+    fmi2CallbackAllocateMemoryTYPE,
+    fmi2CallbackFreeMemoryTYPE,
+    fmi2CallbackFunctions,
+    fmi2CallbackLoggerTYPE,
+)
+from fmpy.fmi3 import FMU3Slave
+from fmpy.model_description import ModelDescription
+
+OK, WARNING, DISCARD, ERROR, FATAL = range(5)
+LABELS = ("ok", "warning", "discard", "error", "fatal", "pending")
+DERIVATIVE_ARGUMENTS = 6  # of fmi2GetDirectionalDerivative, after the instance
+
+Call = Callable[[], int]
+Sink = Callable[[int, str], None]
+
+
+def _text(message: bytes | None) -> str:
+    return (message or b"").decode("utf-8", "replace").strip()
+
+
+class Fmi2:
+    """One FMI 2.0 co-simulation instance.
+
+    Parameters
+    ----------
+    description : model description
+    folder : where the FMU is unzipped
+    name : instance name
+    sink : receives status and text of every message the FMU logs
+    """
+
+    TYPES: ClassVar[dict[str, tuple[str, type]]] = {
+        "Real": ("Real", np.float64),
+        "Integer": ("Integer", np.int32),
+        "Enumeration": ("Integer", np.int32),
+        "Boolean": ("Boolean", np.int32),
+    }
+    PREFIX, STATE, DERIVATIVE = "fmi2", "FMUstate", "fmi2GetDirectionalDerivative"
+
+    def __init__(self, description: ModelDescription, folder: Path, name: str, sink: Sink):
+        interface: Any = description.coSimulation
+        self.slave: Any = self._load(
+            guid=description.guid,
+            modelIdentifier=interface.modelIdentifier,
+            unzipDirectory=str(folder),
+            instanceName=name,
+        )
+        self.sink = sink
+        self._instantiate()
+        self.component = self.slave.component
+        self._do_step = self._raw(f"{self.PREFIX}DoStep", c_double, c_double, c_int)
+        self._get_state = self._raw(f"{self.PREFIX}Get{self.STATE}", c_void_p)
+        self._set_state = self._raw(f"{self.PREFIX}Set{self.STATE}", c_void_p)
+        self._free_state = self._raw(f"{self.PREFIX}Free{self.STATE}", c_void_p)
+
+    @staticmethod
+    def _load(**arguments: Any) -> Any:
+        return FMU2Slave(**arguments)
+
+    def _instantiate(self) -> None:
+        callbacks = fmi2CallbackFunctions()
+        # FMPy's own logger goes through printf, which crashes on a stray '%'; messages are taken as they come
+        callbacks.logger = fmi2CallbackLoggerTYPE(
+            lambda _e, _n, status, _c, text: self.sink(status, _text(text))
+        )
+        callbacks.allocateMemory = fmi2CallbackAllocateMemoryTYPE(calloc)
+        callbacks.freeMemory = fmi2CallbackFreeMemoryTYPE(free)
+        self.slave.instantiate(callbacks=callbacks, loggingOn=True)
+
+    def _raw(self, function: str, *arguments: Any) -> Callable[..., int]:
+        """Return a function of the library with its instance filled in."""
+        prototype = CFUNCTYPE(c_int, c_void_p, *arguments)
+        return partial(prototype((function, self.slave.dll)), self.component)
+
+    def accessor(self, verb: str, kind: str, vr: np.ndarray, values: np.ndarray) -> Call:
+        """Return the call that gets or sets (`verb`) all of `vr` (n,) from or into `values` (m,); both are
+        kept."""
+        sizes = (c_size_t,) if self.PREFIX == "fmi2" else (c_size_t, c_void_p, c_size_t)
+        arguments = (c_void_p, c_size_t, c_void_p) if len(sizes) == 1 else (c_void_p, *sizes)
+        function = self._raw(f"{self.PREFIX}{verb}{kind}", *arguments)
+        tail = () if len(sizes) == 1 else (values.size,)
+        return partial(function, vr.ctypes.data, vr.size, values.ctypes.data, *tail)
+
+    def directional_derivative(
+        self, unknown: np.ndarray, known: np.ndarray, seed: np.ndarray, out: np.ndarray
+    ) -> int:
+        """Write d(unknown)/d(known)·seed into `out`; value references are uint32."""
+        if self.PREFIX == "fmi2":
+            call = self._raw(self.DERIVATIVE, c_void_p, c_size_t, c_void_p, c_size_t, c_void_p, c_void_p)
+            tail = (seed.ctypes.data, out.ctypes.data)
+        else:
+            types = (c_void_p, c_size_t, c_void_p, c_size_t, c_void_p, c_size_t, c_void_p, c_size_t)
+            call = self._raw(self.DERIVATIVE, *types)
+            tail = (seed.ctypes.data, seed.size, out.ctypes.data, out.size)
+        return call(unknown.ctypes.data, unknown.size, known.ctypes.data, known.size, *tail)
+
+    def input_derivatives(self, vr: np.ndarray, orders: np.ndarray, values: np.ndarray) -> Call:
+        """Return the call that sets time derivatives of real inputs (FMI 2.0 alone knows it)."""
+        function = self._raw("fmi2SetRealInputDerivatives", c_void_p, c_size_t, c_void_p, c_void_p)
+        return partial(function, vr.ctypes.data, vr.size, orders.ctypes.data, values.ctypes.data)
+
+    def do_step(self, t: float, h: float) -> int:
+        """Advance from `t` to `t + h`; rollback behind `t` stays allowed."""
+        return self._do_step(t, h, 0)
+
+    def get_state(self, state: c_void_p) -> int:
+        """Save the FMU's state in `state`."""
+        return self._get_state(byref(state))
+
+    def set_state(self, state: c_void_p) -> int:
+        """Take the state back."""
+        return self._set_state(state)
+
+    def free_state(self, state: c_void_p) -> int:
+        """Free a saved state."""
+        return self._free_state(byref(state))
+
+    def enter_initialization(self, start: float, stop: float | None) -> int:
+        """Set up the experiment and enter initialisation."""
+        return self._checked(
+            lambda: self.slave.setupExperiment(startTime=start, stopTime=stop),
+            self.slave.enterInitializationMode,
+        )
+
+    def exit_initialization(self) -> int:
+        """Leave initialisation."""
+        return self._checked(self.slave.exitInitializationMode)
+
+    @staticmethod
+    def _checked(*calls: Callable[[], Any]) -> int:
+        """Make FMPy's calls; its exception becomes a status again."""
+        try:
+            for call in calls:
+                call()
+        except FMICallException as error:
+            return error.status
+        return OK
+
+    def set_string(self, vr: int, text: str) -> int:
+        """Set one string."""
+        return self._checked(lambda: self.slave.setString([vr], [text]))
+
+    def get_string(self, vr: int) -> str:
+        """Return one string."""
+        text = self.slave.getString([vr])[0]
+        return text.decode() if isinstance(text, bytes) else str(text)
+
+    def free(self) -> None:
+        """Terminate nothing, free the instance; the library stays loaded (other instances use it)."""
+        getattr(self.slave, f"{self.PREFIX}FreeInstance")(self.component)
+
+
+class Fmi3(Fmi2):
+    """One FMI 3.0 co-simulation instance (no event mode, no early return)."""
+
+    TYPES: ClassVar[dict[str, tuple[str, type]]] = {
+        "Float64": ("Float64", np.float64),
+        "Float32": ("Float32", np.float32),
+        "Boolean": ("Boolean", np.bool_),
+        "Enumeration": ("Int64", np.int64),
+        **{f"Int{n}": (f"Int{n}", getattr(np, f"int{n}")) for n in (8, 16, 32, 64)},
+        **{f"UInt{n}": (f"UInt{n}", getattr(np, f"uint{n}")) for n in (8, 16, 32, 64)},
+    }
+    PREFIX, STATE, DERIVATIVE = "fmi3", "FMUState", "fmi3GetDirectionalDerivative"
+
+    @staticmethod
+    def _load(**arguments: Any) -> Any:
+        return FMU3Slave(**arguments)
+
+    def _instantiate(self) -> None:
+        self.slave.instantiate(
+            logMessage=lambda _e, status, _c, text: self.sink(status, _text(text)), loggingOn=True
+        )
+
+    def __init__(self, description: ModelDescription, folder: Path, name: str, sink: Sink):
+        super().__init__(description, folder, name, sink)
+        pointer = ctypes.c_void_p
+        self._do_step = self._raw(
+            "fmi3DoStep", c_double, c_double, c_bool, pointer, pointer, pointer, pointer
+        )
+        self.flags = np.zeros(3, dtype=np.bool_)  # event handling needed, terminate, early return
+        self.reached = np.zeros(1)
+        base = self.flags.ctypes.data
+        self._out = (base, base + 1, base + 2, self.reached.ctypes.data)
+
+    def do_step(self, t: float, h: float) -> int:
+        """Advance from `t` to `t + h`; a step cut short or a wish to end counts as discard."""
+        status = self._do_step(t, h, False, *self._out)
+        if status <= WARNING and (self.flags[1] or self.flags[2]):
+            self.sink(DISCARD, f"the FMU stopped at {self.reached[0]:g} s")
+            return DISCARD
+        return status
+
+    def enter_initialization(self, start: float, stop: float | None) -> int:
+        """Enter initialisation."""
+        return self._checked(lambda: self.slave.enterInitializationMode(startTime=start, stopTime=stop))
+
+
+def finalize_python(library: Any) -> None:
+    """End the interpreter that a pythonfmu library keeps; without it the process may abort on its way out."""
+    function = getattr(library, "finalizePythonInterpreter", None)
+    if function is not None:
+        function()
+
+
+__all__ = [
+    "DISCARD",
+    "ERROR",
+    "FATAL",
+    "LABELS",
+    "OK",
+    "WARNING",
+    "Call",
+    "Fmi2",
+    "Fmi3",
+    "c_char_p",
+    "finalize_python",
+]

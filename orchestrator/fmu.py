@@ -1,0 +1,421 @@
+"""One instance of an FMU behind fast buffers.
+
+Loading goes through FMPy; what happens in every macro step (get, set, step, save, restore) goes through
+reused buffers: 12 real values cost 2 µs to 3 µs. Failures of any kind leave as `FmuError`.
+"""
+
+from __future__ import annotations
+
+import atexit
+import contextlib
+import difflib
+import hashlib
+import os
+import re
+import tempfile
+from collections.abc import Iterable, Mapping, Sequence
+from ctypes import c_void_p
+from dataclasses import dataclass
+from pathlib import Path
+from time import perf_counter
+from typing import Any, Literal
+
+import fmpy
+import numpy as np
+from fmpy.model_description import ModelDescription, ModelVariable
+
+from orchestrator.fmi import DISCARD, ERROR, LABELS, WARNING, Call, Fmi2, Fmi3, finalize_python
+
+NOT_FINITE, TIMEOUT = 5, 6
+KINDS: dict[str, str] = {
+    "Real": "real",
+    "Float64": "real",
+    "Float32": "real",
+    "Boolean": "boolean",
+    "String": "string",
+}
+Value = float | int | bool | str
+State = c_void_p
+
+
+class FmuError(Exception):
+    """An FMU failed.
+
+    Attributes
+    ----------
+    component : name of the instance
+    time : s, start of the step that failed
+    status : 2 discard, 3 error, 4 fatal (FMI); 5 an output is not finite, 6 no answer in time
+    message : what happened, with the FMU's own last message
+    """
+
+    def __init__(self, component: str, time: float, status: int, message: str):
+        super().__init__(f"{component}, t = {time:.9g} s: {message}")
+        self.component, self.time, self.status, self.message = component, time, status, message
+
+    @property
+    def recoverable(self) -> bool:
+        """Whether a shorter step may help."""
+        return self.status in (DISCARD, NOT_FINITE)
+
+
+@dataclass(frozen=True)
+class Port:
+    """One scalar variable of an FMU; an array of FMI 3.0 is one port an element, ``name[1]``, ``name[2]`` …
+
+    `variable` is the name of the whole variable, `size` its number of elements, `element` counts them from 0.
+    """
+
+    name: str
+    vr: int
+    unit: str
+    kind: Literal["real", "integer", "boolean", "string"]
+    causality: str
+    variability: str
+    start: str | None
+    fmi_type: str
+    variable: str
+    size: int = 1
+    element: int = 0
+
+
+@dataclass(frozen=True)
+class Capabilities:
+    """What the FMU says it can do."""
+
+    rollback: bool
+    serialize: bool
+    variable_step: bool
+    directional_derivatives: bool
+    input_derivatives: bool
+
+
+def nearest(name: str, known: Iterable[str]) -> str:
+    """Return ``; did you mean …?`` with the known name nearest to `name`, or nothing."""
+    found = difflib.get_close_matches(name, list(known), n=1, cutoff=0.4)
+    return f"; did you mean {found[0]}?" if found else ""
+
+
+def suffixed(name: str, suffix: str) -> str:
+    """Return ``force_rate.x`` for ``force.x`` and ``_rate``: the suffix goes before the axis."""
+    stem, axis = re.fullmatch(r"(.*?)(\.[xyz])?", name).groups()  # type: ignore[union-attr]
+    return f"{stem}{suffix}{axis or ''}"
+
+
+def unzip_folder(sha256: str) -> Path:
+    """Return a plain ASCII folder for the FMU of this hash: loaders choke on others, and compiled code is
+    found again."""
+    for base in (Path.home() / ".cache", Path(tempfile.gettempdir())):
+        folder = base / "line-landing" / "fmu" / sha256[:16]
+        if re.fullmatch(r"[A-Za-z0-9_./\\:-]+", str(folder)):
+            with contextlib.suppress(OSError):
+                folder.parent.mkdir(parents=True, exist_ok=True)
+                if os.access(folder.parent, os.W_OK):
+                    return folder
+    raise OSError("no folder with a plain ASCII path can be written; set TMPDIR to one")
+
+
+def unzip(path: Path, sha256: str) -> Path:
+    """Unzip the FMU once; return the folder."""
+    folder = unzip_folder(sha256)
+    if not (folder / "modelDescription.xml").is_file():
+        with tempfile.TemporaryDirectory(dir=folder.parent) as scratch:
+            fmpy.extract(str(path), os.path.join(scratch, "fmu"))
+            with contextlib.suppress(OSError):  # another process was faster
+                os.rename(os.path.join(scratch, "fmu"), folder)
+    return folder
+
+
+def _ports(variable: ModelVariable) -> list[Port]:
+    kind: Any = KINDS.get(variable.type, "integer")
+    unit = variable.unit or (variable.declaredType.unit if variable.declaredType else None) or ""
+    size = int(np.prod(variable.shape)) if variable.shape else 1
+    names = [variable.name] if not variable.shape else [f"{variable.name}[{i + 1}]" for i in range(size)]
+    fixed = (
+        unit,
+        kind,
+        variable.causality,
+        variable.variability,
+        variable.start,
+        variable.type,
+        variable.name,
+        size,
+    )
+    return [Port(name, variable.valueReference, *fixed, i) for i, name in enumerate(names)]
+
+
+class _Run:
+    """Variables of one FMI type in a group; `pick` are their places in the group, (n,)."""
+
+    def __init__(self, fmu: Fmu, fmi_type: str, ports: list[Port], pick: np.ndarray, values: np.ndarray):
+        kind, dtype = fmu.fmi.TYPES[fmi_type]
+        firsts = dict.fromkeys((p.vr, p.size) for p in ports)
+        starts = np.cumsum([0, *(size for _, size in firsts)])
+        place = {vr: int(start) for (vr, _), start in zip(firsts, starts, strict=False)}
+        self.vr = np.array([vr for vr, _ in firsts], dtype=np.uint32)
+        self.elements = np.array([place[p.vr] + p.element for p in ports], dtype=np.intp)
+        self.pick, self.values = pick, values
+        direct = dtype is np.float64 and pick.size == values.size == int(starts[-1])
+        self.direct = direct and bool(np.all(pick == self.elements))
+        self.buffer = values if self.direct else np.zeros(int(starts[-1]), dtype=dtype)
+        self.get_call: Call = fmu.fmi.accessor("Get", kind, self.vr, self.buffer)
+        self.set_call: Call = fmu.fmi.accessor("Set", kind, self.vr, self.buffer)
+
+    def get(self) -> int:
+        status = self.get_call()
+        if not self.direct:
+            self.values[self.pick] = self.buffer[self.elements]
+        return status
+
+    def set(self) -> int:
+        if not self.direct:
+            self.buffer[self.elements] = self.values[self.pick]
+        return self.set_call()
+
+
+class Group:
+    """Several variables of one FMU that are read or written together.
+
+    Attributes
+    ----------
+    values : (n,) float64; integers and Booleans are cast
+    """
+
+    __slots__ = ("fmu", "names", "runs", "values")
+
+    def __init__(self, fmu: Fmu, names: Sequence[str], values: np.ndarray | None = None):
+        self.fmu, self.names = fmu, tuple(names)
+        self.values = np.zeros(len(self.names)) if values is None else values
+        if self.values.shape != (len(self.names),) or not self.values.flags.c_contiguous:
+            raise ValueError(f"{fmu.name}: the buffer must be contiguous and hold {len(self.names)} numbers")
+        ports = [fmu.port(name) for name in names]
+        types = dict.fromkeys(p.fmi_type for p in ports)
+        picks = {
+            kind: np.array([i for i, p in enumerate(ports) if p.fmi_type == kind], dtype=np.intp)
+            for kind in types
+        }
+        if "String" in types:
+            raise ValueError(
+                f"{fmu.name}: {ports[picks['String'][0]].name} is a string and has no place among numbers"
+            )
+        self.runs = [
+            _Run(fmu, kind, [ports[i] for i in pick], pick, self.values) for kind, pick in picks.items()
+        ]
+
+    def get(self) -> None:
+        """Read all from the FMU into `values`."""
+        for run in self.runs:
+            status = run.get()
+            if status > WARNING:
+                raise self.fmu.error(status, f"reading {self.names[0]} … {self.names[-1]}")
+
+    def set(self) -> None:
+        """Write all of `values` to the FMU."""
+        for run in self.runs:
+            status = run.set()
+            if status > WARNING:
+                raise self.fmu.error(status, f"writing {self.names[0]} … {self.names[-1]}")
+
+    def get_finite(self) -> None:
+        """Read all; raise `FmuError` if a value is not finite."""
+        self.get()
+        total = self.values.dot(self.values)
+        if not total < np.inf:
+            self._name_not_finite()
+
+    def _name_not_finite(self) -> None:
+        bad = [name for name, value in zip(self.names, self.values, strict=True) if not np.isfinite(value)]
+        if bad:
+            more = f" and {len(bad) - 1} more" if len(bad) > 1 else ""
+            raise FmuError(
+                self.fmu.name, self.fmu.time, NOT_FINITE, f"output {bad[0]}{more} is not a finite number"
+            )
+
+
+class Fmu:
+    """One instance of a co-simulation FMU (FMI 2.0 or 3.0).
+
+    Parameters
+    ----------
+    path : the ``.fmu`` file
+    name : instance name; the model's name if none is given
+
+    Attributes
+    ----------
+    ports : the variables by name
+    log : messages of the FMU
+    solves, wall : steps made and the seconds spent in them
+    time : s, start of the last step
+    busy_since : clock at which the running call began, 0 when none runs
+    """
+
+    def __init__(self, path: str | Path, name: str | None = None):
+        self.path = Path(path)
+        self.description, self.sha256 = _read(self.path)
+        self.name = name or str(self.description.modelName)
+        self.ports = {p.name: p for v in self.description.modelVariables for p in _ports(v)}
+        self.capabilities = _capabilities(self.description)
+        self.log: list[str] = []
+        self.solves, self.wall, self.time, self.busy_since = 0, 0.0, 0.0, 0.0
+        binding = Fmi3 if str(self.description.fmiVersion).startswith("3") else Fmi2
+        try:
+            self.fmi = binding(self.description, unzip(self.path, self.sha256), self.name, self._message)
+        except Exception as error:
+            hint = f" ({self.log[-1]})" if self.log else ""
+            raise ValueError(f"{self.path}: the FMU cannot be loaded: {error}{hint}") from error
+        _instances.append(self)
+
+    def _message(self, status: int, text: str) -> None:
+        label = LABELS[status] if 0 <= status < len(LABELS) else str(status)
+        self.log.append(f"[{label}] {text}")
+
+    def error(self, status: int, doing: str) -> FmuError:
+        """Return the error for a call that came back with `status`."""
+        label = LABELS[status] if 0 <= status < len(LABELS) else f"unknown status {status}"
+        said = f"; the FMU says: {self.log[-1]}" if self.log else ""
+        return FmuError(self.name, self.time, status, f"{doing} came back with {label}{said}")
+
+    def port(self, name: str) -> Port:
+        """Return the port; `ValueError` names the nearest one."""
+        if name not in self.ports:
+            raise ValueError(f"{self.name}: no variable {name}{nearest(name, self.ports)}")
+        return self.ports[name]
+
+    def set_parameters(self, values: Mapping[str, Value]) -> None:
+        """Set parameters (and start values of inputs) before initialisation.
+
+        Parameters
+        ----------
+        values : name → value; a Boolean for a Boolean, a word for a string, a number for the rest
+        """
+        for name, value in values.items():
+            port = self.port(name)
+            if port.causality not in ("parameter", "input", "structuralParameter"):
+                raise ValueError(f"{self.name}.{name} is no parameter: its causality is {port.causality}")
+            self._set_one(port, value)
+
+    def _set_one(self, port: Port, value: Value) -> None:
+        if (port.kind == "string") != isinstance(value, str):
+            raise ValueError(f"{self.name}.{port.name} is of type {port.kind}; {value!r} does not fit")
+        if isinstance(value, str):
+            status = self.fmi.set_string(port.vr, value)
+            if status > WARNING:
+                raise self.error(status, f"setting {port.name}")
+            return
+        if port.kind in ("integer", "boolean") and float(value) != int(value):
+            raise ValueError(f"{self.name}.{port.name} is of type {port.kind}; {value!r} does not fit")
+        group = self.group([port.name])
+        group.values[0] = float(value)
+        group.set()
+
+    def read(self, name: str) -> Value:
+        """Return one variable, of any type (slow)."""
+        port = self.port(name)
+        if port.kind == "string":
+            return self.fmi.get_string(port.vr)
+        group = self.group([name])
+        group.get()
+        number = float(group.values[0])
+        return {"real": number, "integer": int(number), "boolean": bool(number)}[port.kind]
+
+    def group(self, names: Sequence[str], values: np.ndarray | None = None) -> Group:
+        """Return a handle on several variables; `values` (n,) is the buffer to use, if there is one
+        already."""
+        return Group(self, names, values)
+
+    def enter_initialization(self, start: float, stop: float | None = None) -> None:
+        """Set up the experiment and enter initialisation mode."""
+        self.time = start
+        self._call("initialisation", self.fmi.enter_initialization, start, stop)
+
+    def exit_initialization(self) -> None:
+        """Leave initialisation mode."""
+        self._call("end of initialisation", self.fmi.exit_initialization)
+
+    def _call(self, doing: str, function: Any, *arguments: Any) -> None:
+        self.busy_since = perf_counter()
+        status = function(*arguments)
+        self.busy_since = 0.0
+        if status > WARNING:
+            raise self.error(status, doing)
+
+    def step(self, t: float, h: float) -> None:
+        """Advance from `t` to `t + h` (s) with the inputs set before."""
+        self.time = t
+        self.solves += 1
+        self.busy_since = clock = perf_counter()
+        status = self.fmi.do_step(t, h)
+        self.wall += perf_counter() - clock
+        self.busy_since = 0.0
+        if status > WARNING:
+            raise self.error(status, f"the step of {h:.6g} s")
+
+    def save(self) -> State:
+        """Return a handle on the complete state; to be given to `release` in the end."""
+        state = c_void_p()
+        status = self.fmi.get_state(state)
+        if status > WARNING:
+            raise self.error(max(status, ERROR), "saving the state")
+        return state
+
+    def restore(self, state: State) -> None:
+        """Go back to a saved state (inputs too)."""
+        status = self.fmi.set_state(state)
+        if status > WARNING:
+            raise self.error(max(status, ERROR), "restoring the state")
+
+    def release(self, state: State) -> None:
+        """Free a saved state."""
+        self.fmi.free_state(state)
+
+    def close(self) -> None:
+        """Free the instance; does nothing the second time."""
+        if self in _instances:
+            _instances.remove(self)
+            _libraries.append(self.fmi.slave.dll)
+            self.fmi.free()
+
+
+def _read(path: Path) -> tuple[ModelDescription, str]:
+    """Return model description and SHA-256 of an FMU; `ValueError` says what is wrong with it."""
+    if not path.is_file():
+        raise ValueError(f"{path}: no such file; build the FMUs, or correct the path")
+    sha256 = hashlib.sha256(path.read_bytes()).hexdigest()
+    try:
+        description = fmpy.read_model_description(str(path), validate=False)
+    except Exception as error:
+        raise ValueError(f"{path}: not an FMU ({error})") from error
+    if description.coSimulation is None:
+        raise ValueError(f"{path}: no co-simulation FMU; export it for co-simulation")
+    if str(description.fmiVersion).startswith("1"):
+        raise ValueError(
+            f"{path}: FMI {description.fmiVersion} is not supported; export it for FMI 2.0 or 3.0"
+        )
+    return description, sha256
+
+
+def _capabilities(description: ModelDescription) -> Capabilities:
+    interface: Any = description.coSimulation
+    return Capabilities(
+        rollback=bool(interface.canGetAndSetFMUstate),
+        serialize=bool(interface.canSerializeFMUstate),
+        variable_step=bool(interface.canHandleVariableCommunicationStepSize),
+        directional_derivatives=bool(interface.providesDirectionalDerivative),
+        input_derivatives=bool(interface.canInterpolateInputs)
+        and str(description.fmiVersion).startswith("2"),
+    )
+
+
+_instances: list[Fmu] = []
+_libraries: list[Any] = []
+
+
+@atexit.register
+def _close_all() -> None:
+    """Free what is left and end the interpreters that the libraries keep."""
+    if any(fmu.busy_since for fmu in _instances):
+        return  # a call still hangs in there: touching it would hang the exit too
+    for fmu in list(_instances):
+        fmu.close()
+    for library in {library._handle: library for library in _libraries}.values():
+        finalize_python(library)

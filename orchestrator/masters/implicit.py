@@ -1,0 +1,221 @@
+"""The implicit coupling loop: predict, step all components, compare, correct, roll back, again.
+
+The unknowns x are the inputs that are fed by a component later in the execution order (the *torn* ones);
+stepping the components in order with x gives S(x), what those inputs should have been. The residual is r =
+S(x) - x. How x is corrected from one iteration to the next is the business of an `Accelerator`, one file
+each.
+"""
+
+from __future__ import annotations
+
+import re
+from typing import ClassVar
+
+import numpy as np
+
+from orchestrator.fmu import ERROR, FmuError, State
+from orchestrator.graph import Graph
+from orchestrator.masters.base import Between, Loads, Master, StepReport, require_rollback, step_node
+from orchestrator.masters.predictor import Predictor
+
+DIVERGED = 1e6  # growth of the residual over its first value that ends an iteration
+
+
+class Accelerator:
+    """How the next iterate follows from the present one; works on scaled vectors."""
+
+    columns = 0
+
+    def begin(self, H: float, scale: np.ndarray) -> None:
+        """Start the iteration of a macro step."""
+
+    def propose(self, x: np.ndarray, r: np.ndarray) -> np.ndarray:
+        """Return the next iterate from the present one and its residual, (n,) each."""
+        raise NotImplementedError
+
+    def accept(self) -> None:
+        """The step has converged: keep what helps the next one."""
+
+    def reject(self) -> None:
+        """The step has not converged: forget what it brought."""
+
+    def reset(self) -> None:
+        """Forget everything."""
+
+
+class Implicit(Master):
+    """Base of the implicit masters.
+
+    Parameters
+    ----------
+    tolerance : largest relative residual of a converged step
+    absolute : magnitude of an unknown (in its unit) below which the residual counts as absolute
+    max_iterations : iterations of one step before it is sub-divided
+    max_depth : the macro step is halved at most so often
+    predictor : order of the prediction of the unknowns, or -1: the one that did best lately
+    """
+
+    IMPLICIT: ClassVar[bool] = True
+    NAME: ClassVar[str] = "implicit"
+
+    def __init__(
+        self,
+        graph: Graph,
+        accelerator: Accelerator,
+        *,
+        tolerance: float = 1e-8,
+        absolute: float = 1e-3,
+        max_iterations: int = 25,
+        max_depth: int = 6,
+        predictor: int = -1,
+    ):
+        super().__init__(graph)
+        require_rollback(graph, self.NAME)
+        self.accelerator = accelerator
+        self.tolerance, self.max_iterations, self.max_depth = tolerance, max_iterations, max_depth
+        self.loads = Loads(graph)
+        self.between = Between(graph, self.loads, torn=True)
+        self.predictor = Predictor(predictor)
+        self.scale = Scale(graph, self.loads, absolute)
+        self.places = graph.torn
+
+    def start(self, t: float) -> None:
+        """Prepare for the first step."""
+        self.accelerator.reset()
+        self.predictor.reset()
+        self.scale.reset()
+        self.x = self.graph.u[self.places]
+
+    def step(self, t: float, H: float) -> StepReport:
+        """Advance all components from `t` to `t + H`; never leaves an unconverged step unsaid."""
+        report = StepReport(t + H, iterations=0)
+        self._advance(t, H, 0, report)
+        report.columns = self.accelerator.columns
+        return report
+
+    def _advance(self, t: float, H: float, depth: int, report: StepReport) -> None:
+        """Advance by `H`, by halves if the iteration does not converge."""
+        self.graph.exchange_discrete()
+        states = self.graph.save()
+        try:
+            last = depth == self.max_depth
+            start_values = self.graph.u.copy()
+            converged, residual = self._solve(t, H, states, report, keep_best=last)
+            if converged or last:
+                report.converged &= converged
+                report.residual = max(report.residual, residual)
+                self._accept(t, H)
+                return
+            self.graph.restore(states)
+            self.graph.u[:] = start_values
+        finally:
+            self.graph.release(states)
+        report.subdivisions += 1
+        self._advance(t, H / 2, depth + 1, report)
+        self._advance(t + H / 2, H / 2, depth + 1, report)
+
+    def _accept(self, t: float, H: float) -> None:
+        self.predictor.append(t + H / 2, self.x)
+        if self.graph.observers:
+            self.graph.accepted(t, H)
+        self.graph.gather()
+
+    def _solve(
+        self, t: float, H: float, states: list[State], report: StepReport, *, keep_best: bool
+    ) -> tuple[bool, float]:
+        """Iterate over one step; return whether it converged and the residual of the iterate the components
+        are left at."""
+        self.between.begin()
+        x, best = self.predictor.predict(t + H / 2, self.x), (np.inf, self.x)
+        scale = self.scale.update(x, H)
+        self.accelerator.begin(H, scale)
+        first = np.inf
+        for k in range(self.max_iterations):
+            r = self._residual(t, H, x, states if k else None, report)
+            if r is None:
+                break
+            residual = self.scale.norm(r, x + r, H)
+            if residual < best[0]:
+                best = (residual, x)
+            if residual <= self.tolerance:
+                self.x = x
+                self.accelerator.accept()
+                return True, residual
+            first = min(first, residual)
+            if not residual <= DIVERGED * max(first, self.tolerance):
+                break
+            scale = self.scale.values
+            x = scale * self.accelerator.propose(x / scale, r / scale)
+        self.accelerator.reject()
+        if keep_best:
+            self._hold(t, H, best[1], states, report)
+        return False, best[0]
+
+    def _hold(self, t: float, H: float, x: np.ndarray, states: list[State], report: StepReport) -> None:
+        """Last resort: make the step with the best iterate held (the rates of loads zero)."""
+        x = x.copy()
+        x[np.isin(self.places, self.loads.fed[:, 1])] = 0.0
+        if self._residual(t, H, x, states, report) is None:
+            raise FmuError(
+                self.graph.nodes[0].name, t, ERROR, f"no step as short as {H:.3g} s can be made; {self._why}"
+            )
+        self.x = x
+
+    def _residual(
+        self, t: float, H: float, x: np.ndarray, states: list[State] | None, report: StepReport
+    ) -> np.ndarray | None:
+        """Step all components with the unknowns `x`; return S(x) - x, or None if that cannot be done."""
+        report.iterations += 1
+        try:
+            if states is not None:
+                self.graph.restore(states)
+            self._evaluate(t, H, x)
+        except FmuError as error:
+            if not error.recoverable:
+                raise
+            self._why = str(error)
+            return None
+        return self.graph.gathered(self.places) - x
+
+    def _evaluate(self, t: float, H: float, x: np.ndarray) -> None:
+        graph = self.graph
+        graph.u[self.places] = x
+        for node in graph.nodes:
+            node.receive(graph.y)
+            step_node(self.between, node, t, H)
+
+
+class Scale:
+    """Typical magnitudes of the unknowns, so that N, N.m and N/s can be compared.
+
+    The running maximum over the components x, y, z of a vector; a load's slope is measured by what it changes
+    in the load within half a step.
+    """
+
+    def __init__(self, graph: Graph, loads: Loads, absolute: float):
+        places, names = graph.torn, [graph.input_names[i] for i in graph.torn]
+        stems = [re.sub(r"\.[xyz]$", "", name) for name in names]
+        keys = {stem: i for i, stem in enumerate(dict.fromkeys(stems))}
+        self.vector = np.array([keys[stem] for stem in stems], dtype=np.intp)
+        where = {int(place): i for i, place in enumerate(places)}
+        pairs = [(where[a], where[b]) for a, b in loads.fed.tolist() if a in where and b in where]
+        self.load, self.rate = np.array(pairs, dtype=np.intp).reshape(-1, 2).T
+        self.absolute = absolute
+        self.largest = np.zeros(len(keys))
+        self.values = np.ones(len(names))
+
+    def reset(self) -> None:
+        """Forget all magnitudes."""
+        self.largest[:] = 0.0
+
+    def update(self, x: np.ndarray, H: float) -> np.ndarray:
+        """Take `x` (n,) into account; return the scale of every unknown, (n,)."""
+        np.maximum.at(self.largest, self.vector, np.abs(x))
+        self.values = self.largest[self.vector] + self.absolute
+        self.values[self.rate] = self.values[self.load] * (2.0 / H)
+        return self.values
+
+    def norm(self, r: np.ndarray, x: np.ndarray, H: float) -> float:
+        """Return the largest relative residual."""
+        self.update(x, H)
+        return float(np.max(np.abs(r) / self.values, initial=0.0))

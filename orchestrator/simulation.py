@@ -1,0 +1,246 @@
+"""Run a master over a graph at fixed macro steps and record."""
+
+from __future__ import annotations
+
+import threading
+from collections.abc import Callable, Sequence
+from dataclasses import dataclass, field
+from time import perf_counter
+
+import numpy as np
+
+from orchestrator.fmu import TIMEOUT, FmuError
+from orchestrator.graph import Graph
+from orchestrator.masters.base import Master, StepReport
+from orchestrator.work import Work
+
+DIVIDES = 1e-9  # how far (stop - start)/H may be from a whole number
+
+
+@dataclass
+class Log:
+    """What a run leaves behind.
+
+    Attributes
+    ----------
+    time : (n + 1,) s, communication points, the start included
+    signals, values : names, and (n + 1, len(signals))
+    steps : n reports
+    wall, wall_first : s, the loop without its first step; that step, with all it compiles
+    wall_components, solves : seconds inside each FMU's steps and their number, both without the first macro
+        step
+    energy : input → work done on the component through it, accumulated, (n + 1,) J
+    error : None if the run came to its end
+    """
+
+    master: str
+    macro_step: float
+    signals: list[str]
+    time: np.ndarray
+    values: np.ndarray
+    steps: list[StepReport] = field(default_factory=list)
+    wall: float = 0.0
+    wall_first: float = 0.0
+    wall_components: dict[str, float] = field(default_factory=dict)
+    solves: dict[str, int] = field(default_factory=dict)
+    energy: dict[str, np.ndarray] = field(default_factory=dict)
+    error: FmuError | None = None
+
+    def signal(self, name: str) -> np.ndarray:
+        """Return one signal over time, (n + 1,)."""
+        return self.values[:, self.signals.index(name)]
+
+    @property
+    def unconverged(self) -> int:
+        """Number of macro steps that did not reach the tolerance."""
+        return sum(not step.converged for step in self.steps)
+
+    @property
+    def iterations_per_step(self) -> float:
+        """Average number of iterations of a macro step."""
+        return sum(step.iterations for step in self.steps) / max(len(self.steps), 1)
+
+
+class Recorder:
+    """Reads the signals of a log from the FMUs, one call an FMU and type.
+
+    Parameters
+    ----------
+    record : signals ``component.variable``; None: every output that is a number
+    """
+
+    def __init__(self, graph: Graph, record: Sequence[str] | None):
+        names = _all_outputs(graph) if record is None else list(record)
+        self.parts, self.signals = [], []
+        for component, fmu in graph.components.items():
+            mine = [name.partition(".")[2] for name in names if name.partition(".")[0] == component]
+            if mine:
+                self.parts.append((fmu.group(mine), slice(len(self.signals), len(self.signals) + len(mine))))
+                self.signals += [f"{component}.{name}" for name in mine]
+        missing = set(names) - set(self.signals)
+        if missing:
+            raise ValueError(f"cannot record {sorted(missing)[0]}: no such component")
+
+    def read(self, row: np.ndarray) -> None:
+        """Read all signals into `row` (len(signals),)."""
+        for group, places in self.parts:
+            group.get()
+            row[places] = group.values
+
+
+def _all_outputs(graph: Graph) -> list[str]:
+    return [
+        f"{component}.{port.name}"
+        for component, fmu in graph.components.items()
+        for port in fmu.ports.values()
+        if port.causality == "output" and port.kind != "string"
+    ]
+
+
+def simulate(
+    graph: Graph,
+    master: Master,
+    start: float,
+    stop: float,
+    H: float,
+    record: Sequence[str] | None = None,
+    on_step: Callable[[StepReport], None] | None = None,
+    timeout: float | None = None,
+) -> Log:
+    """Initialise the graph and advance it from `start` to `stop` in macro steps `H` (s).
+
+    Parameters
+    ----------
+    record : signals to record (numbers of any type); None: every output
+    on_step : called after every macro step
+    timeout : s of wall time that one call of an FMU may take. The run is then made in a thread of its own;
+        an FMU that hangs is left behind in it, and the caller should end the process (`os._exit`) once the
+        results are written.
+
+    Returns
+    -------
+    Log
+        with `error` set, and all steps up to it, if an FMU failed
+
+    Raises
+    ------
+    ValueError
+        if `H` does not divide the time, or a signal does not exist
+    """
+    n = _steps(start, stop, H)
+    recorder = Recorder(graph, record)
+    time, values = start + H * np.arange(n + 1), np.full((n + 1, len(recorder.signals)), np.nan)
+    name = type(master).__name__
+    log = Log(name, H, recorder.signals, time, values)
+    run = _Run(graph, master, recorder, log, on_step)
+    if timeout is None:
+        run(start, stop)
+    else:
+        _watched(run, start, stop, timeout)
+    run.finish()
+    return log
+
+
+def _steps(start: float, stop: float, H: float) -> int:
+    if not H > 0.0:
+        raise ValueError(f"macro step {H:g} s: must be positive")
+    n = round((stop - start) / H)
+    if n < 1 or abs(n * H - (stop - start)) > DIVIDES * (stop - start):
+        raise ValueError(f"macro step {H:g} s does not divide {stop - start:g} s; choose one that does")
+    return n
+
+
+class _Run:
+    """The loop of `simulate`, callable from a thread."""
+
+    def __init__(
+        self,
+        graph: Graph,
+        master: Master,
+        recorder: Recorder,
+        log: Log,
+        on_step: Callable[[StepReport], None] | None,
+    ):
+        self.graph, self.master, self.recorder, self.log, self.on_step = graph, master, recorder, log, on_step
+        self.rows, self.abandoned = 0, False
+        self.failure: BaseException | None = None
+        self.work = Work(graph)
+        self.energy = np.zeros((log.time.size, len(self.work.names)))
+
+    def __call__(self, start: float, stop: float) -> None:
+        try:
+            self._initialize(start, stop)
+            self._loop()
+        except FmuError as error:
+            if not self.abandoned:
+                self.log.error = error
+        except BaseException as error:  # goes on in the caller's thread
+            self.failure = error
+        finally:
+            if self.work.names and self.work in self.graph.observers:
+                self.graph.observers.remove(self.work)
+
+    def _initialize(self, start: float, stop: float) -> None:
+        self.graph.initialize(start, stop)
+        self.master.start(start)
+        if self.work.names:
+            self.work.start()
+            self.graph.observers.append(self.work)
+        self.recorder.read(self.log.values[0])
+        self.rows = 1
+
+    def _loop(self) -> None:
+        log, times, step = self.log, self.log.time.tolist(), self.master.step
+        H, book = log.macro_step, bool(self.work.names)
+        clock = perf_counter()
+        for i, t in enumerate(times[:-1]):
+            if self.abandoned:
+                return
+            report = step(t, H)
+            self.recorder.read(log.values[i + 1])
+            log.steps.append(report)
+            if book:
+                self.energy[i + 1] = self.work.total
+            self.rows = i + 2
+            if self.on_step is not None:
+                self.on_step(report)
+            if not i:
+                log.wall_first, clock = perf_counter() - clock, perf_counter()
+                self._first = {name: (fmu.wall, fmu.solves) for name, fmu in self.graph.components.items()}
+            log.wall = perf_counter() - clock
+
+    def finish(self) -> None:
+        """Cut the log to what was reached; raise what was no failure of an FMU."""
+        if self.failure is not None:
+            raise self.failure
+        log, n = self.log, self.rows
+        log.time, log.values, log.steps = log.time[:n], log.values[:n], log.steps[: max(n - 1, 0)]
+        log.energy = dict(zip(self.work.names, self.energy[:n].T, strict=True))
+        first = getattr(self, "_first", {})
+        for name, fmu in self.graph.components.items():
+            wall, solves = first.get(name, (0.0, 0))
+            log.wall_components[name], log.solves[name] = fmu.wall - wall, fmu.solves - solves
+
+
+def _watched(run: _Run, start: float, stop: float, timeout: float) -> None:
+    """Run in a thread; give up when one call of an FMU lasts longer than `timeout` (s)."""
+    thread = threading.Thread(target=run, args=(start, stop), daemon=True)
+    thread.start()
+    try:
+        while thread.is_alive():
+            thread.join(min(timeout / 4, 0.25))
+            hung = [
+                f
+                for f in run.graph.components.values()
+                if f.busy_since and perf_counter() - f.busy_since > timeout
+            ]
+            if hung and thread.is_alive():
+                run.abandoned = True
+                fmu = hung[0]
+                run.log.error = FmuError(
+                    fmu.name, fmu.time, TIMEOUT, f"no answer within {timeout:g} s; raise the time-out?"
+                )
+                return
+    except BaseException:
+        run.abandoned = True
+        raise
