@@ -6,7 +6,7 @@ import re
 import signal
 from collections.abc import Callable, Iterable, Iterator, Mapping
 from contextlib import contextmanager
-from dataclasses import dataclass, field
+from dataclasses import dataclass
 from fractions import Fraction
 from functools import reduce
 from math import gcd
@@ -14,6 +14,8 @@ from typing import Any
 
 import numpy as np
 
+from fmus.variables import ModuleError
+from orchestrator import landing, monolithic
 from orchestrator.compare import (
     Comparison,
     Reference,
@@ -23,17 +25,18 @@ from orchestrator.compare import (
     signal_errors,
 )
 from orchestrator.errors import InputError, RunError
-from orchestrator.fmu import Fmu, FmuError
-from orchestrator.graph import Connection, Graph, GraphError
+from orchestrator.fmu import FmuError
+from orchestrator.graph import Graph
 from orchestrator.masters import MASTERS, StepReport
 from orchestrator.report import Record, draw_comparison, draw_run, run_label
 from orchestrator.results import RunDirectory, Table
 from orchestrator.scenario import Scenario
 from orchestrator.simulation import Log, simulate
+from orchestrator.wiring import exchange_of, landing_of, opened
 
 LEFT_THE_GROOVE = 3
 """Value of a contact's `status` when the cable has left the groove."""
-FIELD_UNITS = {"time": "s", "arc_length": "m", "position": "m", "tension": "N"}
+FIELD_UNITS = {"time": "s", "part_of_length": "1", "position": "m", "tension": "N"}
 
 Progress = Callable[[float], None]
 """Told the time (s) that a run has come to."""
@@ -45,21 +48,17 @@ class Coupled:
 
     Attributes
     ----------
-    fmus : file and SHA-256 of every component
+    table : signals at the communication points, ``time`` first
     fields : arrays over time as in ``fields.h5``; empty for a general graph
+    fmus : file and SHA-256 of every component
     """
 
     scenario: Scenario
     exchange: str
     log: Log
+    table: Table
+    fields: dict[str, np.ndarray]
     fmus: dict[str, dict[str, str]]
-    fields: dict[str, np.ndarray] = field(default_factory=dict)
-
-    @property
-    def table(self) -> Table:
-        """All signals at the communication points, ``time`` first."""
-        columns = dict(zip(self.log.signals, self.log.values.T, strict=True))
-        return {"time": self.log.time, **columns}
 
     @property
     def steps_table(self) -> Table:
@@ -90,9 +89,7 @@ class Coupled:
     @property
     def record(self) -> Record:
         """What the pictures are drawn from."""
-        return Record(
-            run_label(self.log.master, self.log.macro_step), self.table, self.steps_table, self.fields
-        )
+        return Record(run_label(self.log.master, self.log.macro_step), self.table, self.steps_table, self.fields)
 
     @property
     def fallen(self) -> list[str]:
@@ -102,53 +99,6 @@ class Coupled:
             for name, values in self.table.items()
             if name.startswith("contact") and name.endswith(".status") and np.any(values == LEFT_THE_GROOVE)
         ]
-
-
-def exchange_of(scenario: Scenario) -> str:
-    """Return the contact's exchange: the scenario's, else what suits the master."""
-    implicit = MASTERS[scenario.simulation.master].IMPLICIT
-    return scenario.simulation.exchange or ("waveform" if implicit else "point")
-
-
-@contextmanager
-def opened(scenario: Scenario) -> Iterator[Graph]:
-    """Give the scenario's graph of loaded FMUs; `InputError` if it cannot be made."""
-    try:
-        graph = _landing_graph(scenario) if scenario.is_landing else _general_graph(scenario)
-    except (GraphError, ValueError) as error:
-        raise InputError(f"{scenario.path}: {error}") from None
-    except FmuError as error:
-        raise RunError(str(error), error.time) from None
-    try:
-        yield graph
-    finally:
-        graph.close()
-
-
-def _landing_graph(scenario: Scenario) -> Graph:
-    from orchestrator import landing
-
-    return landing.graph(scenario, exchange_of(scenario))
-
-
-def _general_graph(scenario: Scenario) -> Graph:
-    components: dict[str, Fmu] = {}
-    try:
-        for name, section in scenario.components.items():
-            components[name] = Fmu(section.fmu, name)
-            components[name].set_parameters({**section.parameters, **section.inputs})
-        return Graph(components, [_connection(text) for text in scenario.connections])
-    except BaseException:
-        for fmu in components.values():
-            fmu.close()
-        raise
-
-
-def _connection(text: str) -> Connection:
-    source, arrow, target = (part.strip() for part in text.partition("->"))
-    if not (source and arrow and target):
-        raise ValueError(f'connections: {text!r} is not of the form "a.x -> b.u"')
-    return Connection(source, target)
 
 
 class Interruption(FmuError):
@@ -192,12 +142,8 @@ def run(scenario: Scenario, progress: Progress = lambda _: None) -> Coupled:
         fmus = {n: {"file": str(f.path), "sha256": f.sha256} for n, f in graph.components.items()}
     if log.error is not None and len(log.time) < 2:
         raise RunError(str(log.error), 0.0)
-    coupled = Coupled(scenario, exchange_of(scenario) if scenario.is_landing else "", log, fmus)
-    if scenario.is_landing:
-        from orchestrator import landing
-
-        coupled.fields = landing.cable_fields(scenario, coupled.table)
-    return coupled
+    fields, table = split_fields({"time": log.time, **dict(zip(log.signals, log.values.T, strict=True))})
+    return Coupled(scenario, exchange_of(scenario) if scenario.is_landing else "", log, table, fields, fmus)
 
 
 def _simulated(scenario: Scenario, graph: Graph, progress: Progress) -> Log:
@@ -237,23 +183,39 @@ def _only_couples(name: str, contacts: int) -> bool:
     )
 
 
-def reference(
-    scenario: Scenario, macro_steps: Iterable[float], progress: Progress = lambda _: None
-) -> Reference:
+def split_fields(table: Table) -> tuple[dict[str, np.ndarray], Table]:
+    """Return the cable's shape and tension over time as arrays, and the table without them."""
+    rest = {name: values for name, values in table.items() if not name.startswith("cable.shape[")}
+    n = (len(table) - len(rest)) // 4
+    if n == 0:
+        return {}, rest
+    points = [f"cable.shape[{i}]" for i in range(1, n + 1)]
+    position = [[table[f"{point}.position.{axis}"] for axis in "xyz"] for point in points]
+    fields = {
+        "time": table["time"],
+        "part_of_length": np.linspace(0.0, 1.0, n),
+        "position": np.transpose(position, (2, 0, 1)),
+        "tension": np.transpose([table[f"{point}.tension"] for point in points]),
+    }
+    return fields, rest
+
+
+def reference(scenario: Scenario, macro_steps: Iterable[float], progress: Progress = lambda _: None) -> Reference:
     """Return the reference at the communication points of all `macro_steps`."""
     steps = list(macro_steps)
     if scenario.is_landing:
-        return _monolithic_reference(scenario, communication_times(scenario.simulation.stop_time, steps))
+        return _monolithic_reference(scenario, communication_times(scenario.simulation.stop_time, steps), progress)
     return _fine_reference(scenario, steps, progress)
 
 
-def _monolithic_reference(scenario: Scenario, times: np.ndarray) -> Reference:
-    from orchestrator import landing, monolithic
-
-    tolerance = min(scenario.simulation.tolerances.values(), default=1e-4)
-    solution = monolithic.solve(landing.problem(scenario), scenario.simulation.stop_time, times, tolerance)
-    table = {"time": times, **solution.signals}
-    return Reference("monolithic", table, solution.wall_s, dict(solution.estimated_error))
+def _monolithic_reference(scenario: Scenario, times: np.ndarray, progress: Progress) -> Reference:
+    wanted = landing_of(scenario)
+    try:
+        solution = monolithic.solve(lambda: landing.problem(wanted), times, progress=progress)
+    except ModuleError as error:
+        raise RunError(str(error)) from None
+    fields, table = split_fields({"time": times, **solution.signals})
+    return Reference("monolithic", table, solution.wall_s, solution.estimated_error, fields)
 
 
 def _fine_reference(scenario: Scenario, macro_steps: list[float], progress: Progress) -> Reference:
@@ -315,7 +277,7 @@ def summary(coupled: Coupled) -> dict[str, Any]:
         "unconverged_steps": log.unconverged,
         "left_the_groove": coupled.fallen,
         "interface_work_J": {name: float(work[-1]) for name, work in log.energy.items()},
-        "extremes": {name: _extremes(log.time, log.signal(name)) for name in log.signals},
+        "extremes": {n: _extremes(log.time, values) for n, values in coupled.table.items() if n != "time"},
     }
 
 

@@ -109,9 +109,7 @@ def _signal_panel(axis: Axes, panel: Panel, run: Table, reference: Table | None)
     if reference is not None:
         axis.plot(reference["time"], _shown(panel, reference), color="0.6", linewidth=2.6, label="Monolithic")
     line = (0, (4, 2)) if reference is not None else "-"
-    axis.plot(
-        run["time"], _shown(panel, run), color=VERMILION, linewidth=1.1, label="Coupled", linestyle=line
-    )
+    axis.plot(run["time"], _shown(panel, run), color=VERMILION, linewidth=1.1, label="Coupled", linestyle=line)
     axis.set_ylabel(f"{panel.label} [{panel.unit}]")
     axis.yaxis.set_major_locator(MaxNLocator(5))
     axis.set_xlim(run["time"][0], run["time"][-1])
@@ -165,9 +163,7 @@ def errors(path: Path, runs: Mapping[str, Table], reference: Table, panels: Sequ
             axis.set_ylabel(f"|Δ {panel.label}|\n[{panel.unit}]")
             axis.set_xlim(reference["time"][0], reference["time"][-1])
         axes[-1].set_xlabel("Time [s]")
-        figure.legend(
-            *axes[0].get_legend_handles_labels(), loc="outside upper center", ncols=min(4, len(runs))
-        )
+        figure.legend(*axes[0].get_legend_handles_labels(), loc="outside upper center", ncols=min(4, len(runs)))
         figure.align_ylabels(axes)
 
 
@@ -181,9 +177,7 @@ def convergence(path: Path, comparison: Comparison) -> None:
                 _convergence_line(axis, comparison, master, signal, colour, marker)
             axis.axhline(tolerance, color=GREY, linewidth=0.9, linestyle=":")
             where = axis.get_yaxis_transform()
-            axis.text(
-                0.99, tolerance, "allowed", transform=where, ha="right", va="bottom", color=GREY, fontsize=8
-            )
+            axis.text(0.99, tolerance, "allowed", transform=where, ha="right", va="bottom", color=GREY, fontsize=8)
             _macro_step_axis(axis, comparison)
             axis.set_ylabel(f"Relative error, {_words(signal)} [–]")
         handles, labels = axes[0].get_legend_handles_labels()
@@ -204,9 +198,7 @@ def _macro_step_axis(axis: Axes, comparison: Comparison) -> None:
     axis.set_xlabel("Macro step [ms]")
 
 
-def _convergence_line(
-    axis: Axes, comparison: Comparison, master: str, signal: str, colour: str, marker: str
-) -> None:
+def _convergence_line(axis: Axes, comparison: Comparison, master: str, signal: str, colour: str, marker: str) -> None:
     runs = [run for run in comparison.runs if run.master == master and signal in run.signals]
     points = sorted((run.macro_step, run.signals[signal].relative_max_error) for run in runs)
     steps, values = np.array(points).reshape(-1, 2).T
@@ -214,9 +206,7 @@ def _convergence_line(
     order = comparison.observed_order.get(master, {}).get(signal, np.nan)
     if np.isfinite(order):
         middle = float(np.sqrt(steps[0] * steps[-1])), float(np.sqrt(values[0] * values[-1]))
-        axis.annotate(
-            f"slope {order:.1f}", middle, (6, -12), textcoords="offset points", color=colour, fontsize=8
-        )
+        axis.annotate(f"slope {order:.1f}", middle, (6, -12), textcoords="offset points", color=colour, fontsize=8)
 
 
 def iterations(path: Path, tables: Mapping[str, Table], bins: int = 250) -> None:

@@ -70,9 +70,7 @@ class RunDirectory:
 
     def write_manifest(self, content: Mapping[str, Any], error: str | None = None) -> None:
         """Write ``manifest.json``, the last file; with `error` the run is marked as incomplete."""
-        self.write_json(
-            "manifest.json", {"complete": error is None, "error": error, **content, **circumstances()}
-        )
+        self.write_json("manifest.json", {"complete": error is None, "error": error, **content, **circumstances()})
 
 
 @contextmanager
