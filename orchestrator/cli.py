@@ -97,10 +97,10 @@ def list_() -> None:
 def validate(scenario: ScenarioFile, robot: Robot = None, set_: Set = None) -> None:
     """Parse, load, check connections, units and contract; nothing is run."""
     loaded = _load(scenario, robot, set_)
-    from orchestrator.wiring import opened
+    from orchestrator.experiment import opened
 
     with opened(loaded) as graph:
-        print(f"{scenario}: valid; {len(graph.components)} FMUs, {len(graph.connections)} connections")
+        print(f"{scenario}: valid; {len(graph.components)} FMUs, {len(list(graph.connections))} connections")
 
 
 @app.command()

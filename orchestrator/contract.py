@@ -126,6 +126,8 @@ CONTACT = (
 )
 CONTRACTS = {"robot": ROBOT, "cable": CABLE, "contact": CONTACT}
 MOST_PORTS = 4
+BREAKS = ("missing", "wrong")
+"""Verdicts with which a landing cannot run."""
 
 
 @dataclass(frozen=True)
@@ -169,7 +171,7 @@ def check_variables(kind: str, known: dict[str, Variable]) -> list[Finding]:
 
 def is_met(findings: list[Finding]) -> bool:
     """Whether nothing that is needed is missing or wrong."""
-    return not any(f.verdict in ("missing", "wrong") for f in findings)
+    return not any(f.verdict in BREAKS for f in findings)
 
 
 def _has_port(kind: str, known: dict[str, Variable], k: int) -> bool:

@@ -10,12 +10,13 @@ from dataclasses import dataclass
 from fractions import Fraction
 from functools import reduce
 from math import gcd
+from pathlib import Path
 from typing import Any
 
 import numpy as np
 
 from fmus.variables import ModuleError
-from orchestrator import landing, monolithic
+from orchestrator import landing, monolithic, vocabulary
 from orchestrator.compare import (
     Comparison,
     Reference,
@@ -24,19 +25,19 @@ from orchestrator.compare import (
     largest_difference,
     signal_errors,
 )
+from orchestrator.contract import BREAKS, check_variables
 from orchestrator.errors import InputError, RunError
-from orchestrator.fmu import FmuError
-from orchestrator.graph import Graph
+from orchestrator.fmu import Fmu, FmuError
+from orchestrator.graph import Connection, Graph
 from orchestrator.masters import MASTERS, StepReport
 from orchestrator.report import Record, draw_comparison, draw_run, run_label
 from orchestrator.results import RunDirectory, Table
 from orchestrator.scenario import Scenario
 from orchestrator.simulation import Log, simulate
-from orchestrator.wiring import exchange_of, landing_of, opened
 
 LEFT_THE_GROOVE = 3
 """Value of a contact's `status` when the cable has left the groove."""
-FIELD_UNITS = {"time": "s", "part_of_length": "1", "position": "m", "tension": "N"}
+FIELD_UNITS = {"time": "s", "arc_length": "m", "position": "m", "tension": "N"}
 
 Progress = Callable[[float], None]
 """Told the time (s) that a run has come to."""
@@ -101,6 +102,60 @@ class Coupled:
         ]
 
 
+def exchange_of(scenario: Scenario) -> str:
+    """Return the contact's exchange: the scenario's, else what suits the master."""
+    implicit = MASTERS[scenario.simulation.master].IMPLICIT
+    return scenario.simulation.exchange or ("waveform" if implicit else "point")
+
+
+@contextmanager
+def opened(scenario: Scenario) -> Iterator[Graph]:
+    """Give the scenario's graph of loaded FMUs; `InputError` if it cannot be made."""
+    try:
+        _require_contract(scenario)
+        graph = landing.graph(scenario, exchange_of(scenario)) if scenario.is_landing else _general_graph(scenario)
+    except (ModuleError, ValueError) as error:
+        raise InputError(f"{scenario.path}: {line}" for line in str(error).splitlines()) from None
+    except FmuError as error:
+        raise RunError(str(error), error.time) from None
+    try:
+        yield graph
+    finally:
+        graph.close()
+
+
+def _require_contract(scenario: Scenario) -> None:
+    """Hold the foreign FMUs of a landing against their contracts."""
+    sections = {"cable": scenario.cable, "robot": scenario.robot, "contact": scenario.contact}
+    for kind, section in sections.items() if scenario.is_landing else ():
+        if section is None or section.fmu is None:
+            continue
+        findings = check_variables(kind, vocabulary.of_fmu(Path(section.fmu)))
+        lines = [f"{kind}.fmu: {f.what} is {f.verdict}: {f.note}" for f in findings if f.verdict in BREAKS]
+        if lines:
+            raise ValueError("\n".join([*lines, f"`orchestrator check {section.fmu}` shows the whole contract"]))
+
+
+def _general_graph(scenario: Scenario) -> Graph:
+    components: dict[str, Fmu] = {}
+    try:
+        for name, section in scenario.components.items():
+            components[name] = Fmu(section.fmu, name)
+            components[name].set_parameters({**section.parameters, **section.inputs})
+        return Graph(components, [_connection(text) for text in scenario.connections])
+    except BaseException:
+        for fmu in components.values():
+            fmu.close()
+        raise
+
+
+def _connection(text: str) -> Connection:
+    source, arrow, target = (part.strip() for part in text.partition("->"))
+    if not (source and arrow and target):
+        raise ValueError(f'connections: {text!r} is not of the form "a.x -> b.u"')
+    return Connection(source, target)
+
+
 class Interruption(FmuError):
     """Ctrl-C: ends a run at a communication point, so that its results so far are kept."""
 
@@ -142,7 +197,7 @@ def run(scenario: Scenario, progress: Progress = lambda _: None) -> Coupled:
         fmus = {n: {"file": str(f.path), "sha256": f.sha256} for n, f in graph.components.items()}
     if log.error is not None and len(log.time) < 2:
         raise RunError(str(log.error), 0.0)
-    fields, table = split_fields({"time": log.time, **dict(zip(log.signals, log.values.T, strict=True))})
+    fields, table = split_fields(scenario, {"time": log.time, **dict(zip(log.signals, log.values.T, strict=True))})
     return Coupled(scenario, exchange_of(scenario) if scenario.is_landing else "", log, table, fields, fmus)
 
 
@@ -183,38 +238,26 @@ def _only_couples(name: str, contacts: int) -> bool:
     )
 
 
-def split_fields(table: Table) -> tuple[dict[str, np.ndarray], Table]:
+def split_fields(scenario: Scenario, table: Table) -> tuple[dict[str, np.ndarray], Table]:
     """Return the cable's shape and tension over time as arrays, and the table without them."""
     rest = {name: values for name, values in table.items() if not name.startswith("cable.shape[")}
-    n = (len(table) - len(rest)) // 4
-    if n == 0:
-        return {}, rest
-    points = [f"cable.shape[{i}]" for i in range(1, n + 1)]
-    position = [[table[f"{point}.position.{axis}"] for axis in "xyz"] for point in points]
-    fields = {
-        "time": table["time"],
-        "part_of_length": np.linspace(0.0, 1.0, n),
-        "position": np.transpose(position, (2, 0, 1)),
-        "tension": np.transpose([table[f"{point}.tension"] for point in points]),
-    }
-    return fields, rest
+    return landing.cable_fields(scenario, table) if scenario.is_landing else {}, rest
 
 
 def reference(scenario: Scenario, macro_steps: Iterable[float], progress: Progress = lambda _: None) -> Reference:
     """Return the reference at the communication points of all `macro_steps`."""
     steps = list(macro_steps)
-    if scenario.is_landing:
+    if scenario.is_landing and landing.has_monolithic(scenario):
         return _monolithic_reference(scenario, communication_times(scenario.simulation.stop_time, steps), progress)
     return _fine_reference(scenario, steps, progress)
 
 
 def _monolithic_reference(scenario: Scenario, times: np.ndarray, progress: Progress) -> Reference:
-    wanted = landing_of(scenario)
     try:
-        solution = monolithic.solve(lambda: landing.problem(wanted), times, progress=progress)
+        solution = monolithic.solve(lambda: landing.problem(scenario), times, progress=progress)
     except ModuleError as error:
         raise RunError(str(error)) from None
-    fields, table = split_fields({"time": times, **solution.signals})
+    fields, table = split_fields(scenario, {"time": times, **solution.signals})
     return Reference("monolithic", table, solution.wall_s, solution.estimated_error, fields)
 
 
