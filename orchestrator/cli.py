@@ -281,7 +281,7 @@ def _print_comparison(comparison: Comparison) -> None:
 
     reference = comparison.reference
     print(f"reference: {reference.kind}, {reference.wall_s:.2f} s")
-    costs = Table("master", "H [s]", "iterations", "unconverged", "cable steps", "wall [s]", box=None, pad_edge=False)
+    costs = Table("master", "H \\[s]", "iterations", "unconverged", "cable steps", "wall \\[s]", box=None, pad_edge=False)
     for r in comparison.runs:
         numbers = (
             f"{r.iterations_per_step:.2f}",
@@ -291,7 +291,7 @@ def _print_comparison(comparison: Comparison) -> None:
         )
         costs.add_row(r.master, f"{r.macro_step:g}", *numbers)
     _print(costs)
-    checks = Table("master", "H [s]", "signal", "relative error", "allowed", "verdict", box=None, pad_edge=False)
+    checks = Table("master", "H \\[s]", "signal", "relative error", "allowed", "verdict", box=None, pad_edge=False)
     for c in comparison.checks:
         word = _markup(verdict_word(c.passed, c.note))
         shown = f"[green]{word}[/]" if c.passed else f"[red]{word}[/]"

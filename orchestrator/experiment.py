@@ -90,7 +90,7 @@ class Coupled:
     @property
     def record(self) -> Record:
         """What the pictures are drawn from."""
-        return Record(run_label(self.log.master, self.log.macro_step), self.table, self.steps_table, self.fields)
+        return Record(self.master, self.log.macro_step, self.table, self.steps_table, self.fields)
 
     @property
     def fallen(self) -> list[str]:
