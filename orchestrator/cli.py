@@ -53,17 +53,13 @@ ScenarioFile = Annotated[Path, typer.Argument(metavar="SCENARIO", help="Scenario
 Out = Annotated[
     Path | None, typer.Option(help="Directory of the results; it must not exist. Default: runs/SCENARIO-NNN.")
 ]
-Robot = Annotated[
-    str | None, typer.Option(metavar="NAME|FILE.fmu", help="Another robot in the scenario's place.")
-]
+Robot = Annotated[str | None, typer.Option(metavar="NAME|FILE.fmu", help="Another robot in the scenario's place.")]
 MasterName = Annotated[str | None, typer.Option(help="Another master, see `orchestrator list`.")]
 MacroStep = Annotated[float | None, typer.Option(help="Another macro step, s.")]
 Stop = Annotated[float | None, typer.Option(help="Another stop time, s.")]
 Set = Annotated[
     list[str] | None,
-    typer.Option(
-        "--set", metavar="KEY=VALUE", help="Another value, e.g. robot.parameters.mass=12; repeatable."
-    ),
+    typer.Option("--set", metavar="KEY=VALUE", help="Another value, e.g. robot.parameters.mass=12; repeatable."),
 ]
 Quiet = Annotated[bool, typer.Option("--quiet", help="No progress.")]
 
@@ -101,10 +97,10 @@ def list_() -> None:
 def validate(scenario: ScenarioFile, robot: Robot = None, set_: Set = None) -> None:
     """Parse, load, check connections, units and contract; nothing is run."""
     loaded = _load(scenario, robot, set_)
-    from orchestrator import experiment
+    from orchestrator.experiment import opened
 
-    with experiment.opened(loaded) as graph:
-        print(f"{scenario}: valid; {len(graph.components)} FMUs, {len(graph.connections)} connections")
+    with opened(loaded) as graph:
+        print(f"{scenario}: valid; {len(graph.components)} FMUs, {len(list(graph.connections))} connections")
 
 
 @app.command()
@@ -123,9 +119,7 @@ def check(
     colours = {"ok": "green", "missing": "red", "wrong": "red", "advice": "yellow"}
     table = Table(f"{kind} contract", "", "", box=None, pad_edge=False, header_style="bold")
     for finding in findings:
-        table.add_row(
-            finding.what, f"[{colours[finding.verdict]}]{finding.verdict}[/]", _markup(finding.note)
-        )
+        table.add_row(finding.what, f"[{colours[finding.verdict]}]{finding.verdict}[/]", _markup(finding.note))
     _print(table)
     met = is_met(findings)
     print(f"{fmu}: {'meets' if met else 'does not meet'} the {kind} contract")
@@ -167,9 +161,7 @@ def compare(
     stop: Stop = None,
     set_: Set = None,
     masters: Annotated[str | None, typer.Option(metavar="A,B,…", help="Masters to compare.")] = None,
-    macro_steps: Annotated[
-        str | None, typer.Option(metavar="H,H,…", help="Macro steps to compare, s.")
-    ] = None,
+    macro_steps: Annotated[str | None, typer.Option(metavar="H,H,…", help="Macro steps to compare, s.")] = None,
     quiet: Quiet = False,
 ) -> None:
     """Run a scenario coupled and with the monolithic solver, and say how large the coupling error is."""
@@ -186,9 +178,7 @@ def compare(
     comparison = experiment.compared(runs, reference)
     experiment.write_comparison(RunDirectory(path), comparison, runs)
     _print_comparison(comparison)
-    print(
-        f"verdict: {'pass' if comparison.passed else 'FAIL'}; results in {path}, pictures in {path / 'plots'}"
-    )
+    print(f"verdict: {'pass' if comparison.passed else 'FAIL'}; results in {path}, pictures in {path / 'plots'}")
     raise typer.Exit(_status(runs, comparison.passed and not any(coupled.fallen for coupled in runs)))
 
 
@@ -229,9 +219,7 @@ def _variants(
     try:
         steps = [float(text) for text in _items(macro_steps)] or [first.simulation.macro_step]
     except ValueError:
-        raise InputError(
-            f"--macro-steps {macro_steps}: write numbers with commas between, 0.01,0.005"
-        ) from None
+        raise InputError(f"--macro-steps {macro_steps}: write numbers with commas between, 0.01,0.005") from None
     return [load(name, step) for name in dict.fromkeys(names) for step in dict.fromkeys(steps)]
 
 
@@ -293,9 +281,7 @@ def _print_comparison(comparison: Comparison) -> None:
 
     reference = comparison.reference
     print(f"reference: {reference.kind}, {reference.wall_s:.2f} s")
-    costs = Table(
-        "master", "H [s]", "iterations", "unconverged", "cable steps", "wall [s]", box=None, pad_edge=False
-    )
+    costs = Table("master", "H \\[s]", "iterations", "unconverged", "cable steps", "wall \\[s]", box=None, pad_edge=False)
     for r in comparison.runs:
         numbers = (
             f"{r.iterations_per_step:.2f}",
@@ -305,9 +291,7 @@ def _print_comparison(comparison: Comparison) -> None:
         )
         costs.add_row(r.master, f"{r.macro_step:g}", *numbers)
     _print(costs)
-    checks = Table(
-        "master", "H [s]", "signal", "relative error", "allowed", "verdict", box=None, pad_edge=False
-    )
+    checks = Table("master", "H \\[s]", "signal", "relative error", "allowed", "verdict", box=None, pad_edge=False)
     for c in comparison.checks:
         word = _markup(verdict_word(c.passed, c.note))
         shown = f"[green]{word}[/]" if c.passed else f"[red]{word}[/]"
@@ -343,9 +327,7 @@ def _progress(quiet: bool) -> Iterator[Callable[[str, float], Callable[[float], 
         TextColumn("{task.completed:.2f} of {task.total:g} s"),
     )
     console = Console(stderr=True, quiet=quiet)
-    with Progress(
-        *columns, TimeElapsedColumn(), TimeRemainingColumn(), console=console, disable=quiet
-    ) as bars:
+    with Progress(*columns, TimeElapsedColumn(), TimeRemainingColumn(), console=console, disable=quiet) as bars:
 
         def start(description: str, total: float) -> Callable[[float], None]:
             task = bars.add_task(description, total=total)

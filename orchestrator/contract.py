@@ -126,6 +126,8 @@ CONTACT = (
 )
 CONTRACTS = {"robot": ROBOT, "cable": CABLE, "contact": CONTACT}
 MOST_PORTS = 4
+BREAKS = ("missing", "wrong")
+"""Verdicts with which a landing cannot run."""
 
 
 @dataclass(frozen=True)
@@ -169,7 +171,7 @@ def check_variables(kind: str, known: dict[str, Variable]) -> list[Finding]:
 
 def is_met(findings: list[Finding]) -> bool:
     """Whether nothing that is needed is missing or wrong."""
-    return not any(f.verdict in ("missing", "wrong") for f in findings)
+    return not any(f.verdict in BREAKS for f in findings)
 
 
 def _has_port(kind: str, known: dict[str, Variable], k: int) -> bool:
@@ -185,9 +187,7 @@ def _finding(point: Point, k: int, known: dict[str, Variable]) -> Finding:
         return Finding(what, "missing" if point.needed else "advice", f"{note} {point.use}".strip())
     for variable in (known[name] for name in names):
         if variable.causality != point.causality:
-            return Finding(
-                what, "wrong", f"{variable.name} is a {variable.causality}, not a {point.causality}"
-            )
+            return Finding(what, "wrong", f"{variable.name} is a {variable.causality}, not a {point.causality}")
         if variable.kind == "string":
             return Finding(what, "wrong", f"{variable.name} is a string, not a number")
         if variable.unit != point.unit:
@@ -206,21 +206,15 @@ def _capabilities(path: Path, description: Any) -> list[Finding]:
 
     interface = description.coSimulation
     if interface is None:
-        return [
-            Finding("co-simulation", "missing", "the FMU is for model exchange; export it for co-simulation")
-        ]
+        return [Finding("co-simulation", "missing", "the FMU is for model exchange; export it for co-simulation")]
     platforms = supported_platforms(str(path))
     here = platform in platforms
     rollback = bool(interface.canGetAndSetFMUstate)
     variable = bool(interface.canHandleVariableCommunicationStepSize)
     return [
         Finding("co-simulation", "ok", f"FMI {description.fmiVersion}"),
-        Finding(
-            "binary for this machine", "ok" if here else "missing", platform if here else f"has {platforms}"
-        ),
-        Finding(
-            "state can be saved", *_advised(rollback, "implicit masters need it; explicit ones do without")
-        ),
+        Finding("binary for this machine", "ok" if here else "missing", platform if here else f"has {platforms}"),
+        Finding("state can be saved", *_advised(rollback, "implicit masters need it; explicit ones do without")),
         Finding("variable macro step", *_advised(variable, "sub-division of a macro step needs it")),
     ]
 

@@ -6,14 +6,17 @@ import re
 import signal
 from collections.abc import Callable, Iterable, Iterator, Mapping
 from contextlib import contextmanager
-from dataclasses import dataclass, field
+from dataclasses import dataclass
 from fractions import Fraction
 from functools import reduce
 from math import gcd
+from pathlib import Path
 from typing import Any
 
 import numpy as np
 
+from fmus.variables import ModuleError
+from orchestrator import landing, monolithic, vocabulary
 from orchestrator.compare import (
     Comparison,
     Reference,
@@ -22,9 +25,10 @@ from orchestrator.compare import (
     largest_difference,
     signal_errors,
 )
+from orchestrator.contract import BREAKS, check_variables
 from orchestrator.errors import InputError, RunError
 from orchestrator.fmu import Fmu, FmuError
-from orchestrator.graph import Connection, Graph, GraphError
+from orchestrator.graph import Connection, Graph
 from orchestrator.masters import MASTERS, StepReport
 from orchestrator.report import Record, draw_comparison, draw_run, run_label
 from orchestrator.results import RunDirectory, Table
@@ -45,21 +49,17 @@ class Coupled:
 
     Attributes
     ----------
-    fmus : file and SHA-256 of every component
+    table : signals at the communication points, ``time`` first
     fields : arrays over time as in ``fields.h5``; empty for a general graph
+    fmus : file and SHA-256 of every component
     """
 
     scenario: Scenario
     exchange: str
     log: Log
+    table: Table
+    fields: dict[str, np.ndarray]
     fmus: dict[str, dict[str, str]]
-    fields: dict[str, np.ndarray] = field(default_factory=dict)
-
-    @property
-    def table(self) -> Table:
-        """All signals at the communication points, ``time`` first."""
-        columns = dict(zip(self.log.signals, self.log.values.T, strict=True))
-        return {"time": self.log.time, **columns}
 
     @property
     def steps_table(self) -> Table:
@@ -84,15 +84,13 @@ class Coupled:
 
     @property
     def label(self) -> str:
-        """Master and macro step, as legends and folders show them."""
+        """Master and macro step, as folders are called."""
         return run_label(self.master, self.log.macro_step)
 
     @property
     def record(self) -> Record:
         """What the pictures are drawn from."""
-        return Record(
-            run_label(self.log.master, self.log.macro_step), self.table, self.steps_table, self.fields
-        )
+        return Record(self.master, self.log.macro_step, self.table, self.steps_table, self.fields)
 
     @property
     def fallen(self) -> list[str]:
@@ -114,9 +112,10 @@ def exchange_of(scenario: Scenario) -> str:
 def opened(scenario: Scenario) -> Iterator[Graph]:
     """Give the scenario's graph of loaded FMUs; `InputError` if it cannot be made."""
     try:
-        graph = _landing_graph(scenario) if scenario.is_landing else _general_graph(scenario)
-    except (GraphError, ValueError) as error:
-        raise InputError(f"{scenario.path}: {error}") from None
+        _require_contract(scenario)
+        graph = landing.graph(scenario, exchange_of(scenario)) if scenario.is_landing else _general_graph(scenario)
+    except (ModuleError, ValueError) as error:
+        raise InputError(f"{scenario.path}: {line}" for line in str(error).splitlines()) from None
     except FmuError as error:
         raise RunError(str(error), error.time) from None
     try:
@@ -125,10 +124,16 @@ def opened(scenario: Scenario) -> Iterator[Graph]:
         graph.close()
 
 
-def _landing_graph(scenario: Scenario) -> Graph:
-    from orchestrator import landing
-
-    return landing.graph(scenario, exchange_of(scenario))
+def _require_contract(scenario: Scenario) -> None:
+    """Hold the foreign FMUs of a landing against their contracts."""
+    sections = {"cable": scenario.cable, "robot": scenario.robot, "contact": scenario.contact}
+    for kind, section in sections.items() if scenario.is_landing else ():
+        if section is None or section.fmu is None:
+            continue
+        findings = check_variables(kind, vocabulary.of_fmu(Path(section.fmu)))
+        lines = [f"{kind}.fmu: {f.what} is {f.verdict}: {f.note}" for f in findings if f.verdict in BREAKS]
+        if lines:
+            raise ValueError("\n".join([*lines, f"`orchestrator check {section.fmu}` shows the whole contract"]))
 
 
 def _general_graph(scenario: Scenario) -> Graph:
@@ -192,12 +197,8 @@ def run(scenario: Scenario, progress: Progress = lambda _: None) -> Coupled:
         fmus = {n: {"file": str(f.path), "sha256": f.sha256} for n, f in graph.components.items()}
     if log.error is not None and len(log.time) < 2:
         raise RunError(str(log.error), 0.0)
-    coupled = Coupled(scenario, exchange_of(scenario) if scenario.is_landing else "", log, fmus)
-    if scenario.is_landing:
-        from orchestrator import landing
-
-        coupled.fields = landing.cable_fields(scenario, coupled.table)
-    return coupled
+    fields, table = split_fields(scenario, {"time": log.time, **dict(zip(log.signals, log.values.T, strict=True))})
+    return Coupled(scenario, exchange_of(scenario) if scenario.is_landing else "", log, table, fields, fmus)
 
 
 def _simulated(scenario: Scenario, graph: Graph, progress: Progress) -> Log:
@@ -237,27 +238,27 @@ def _only_couples(name: str, contacts: int) -> bool:
     )
 
 
-def reference(
-    scenario: Scenario, macro_steps: Iterable[float], progress: Progress = lambda _: None
-) -> Reference:
+def split_fields(scenario: Scenario, table: Table) -> tuple[dict[str, np.ndarray], Table]:
+    """Return the cable's shape and tension over time as arrays, and the table without them."""
+    rest = {name: values for name, values in table.items() if not name.startswith("cable.shape[")}
+    return landing.cable_fields(scenario, table) if scenario.is_landing else {}, rest
+
+
+def reference(scenario: Scenario, macro_steps: Iterable[float], progress: Progress = lambda _: None) -> Reference:
     """Return the reference at the communication points of all `macro_steps`."""
     steps = list(macro_steps)
-    if scenario.is_landing:
-        from orchestrator import landing
-
-        if landing.has_monolithic(scenario):
-            times = communication_times(scenario.simulation.stop_time, steps)
-            return _monolithic_reference(scenario, times, progress)
+    if scenario.is_landing and landing.has_monolithic(scenario):
+        return _monolithic_reference(scenario, communication_times(scenario.simulation.stop_time, steps), progress)
     return _fine_reference(scenario, steps, progress)
 
 
 def _monolithic_reference(scenario: Scenario, times: np.ndarray, progress: Progress) -> Reference:
-    from orchestrator import landing, monolithic
-
-    solution = monolithic.solve(lambda: landing.problem(scenario), times, progress=progress)
-    table = {"time": times, **solution.signals}
-    fields = landing.cable_fields(scenario, table)
-    return Reference("monolithic", table, solution.wall_s, dict(solution.estimated_error), fields)
+    try:
+        solution = monolithic.solve(lambda: landing.problem(scenario), times, progress=progress)
+    except ModuleError as error:
+        raise RunError(str(error)) from None
+    fields, table = split_fields(scenario, {"time": times, **solution.signals})
+    return Reference("monolithic", table, solution.wall_s, solution.estimated_error, fields)
 
 
 def _fine_reference(scenario: Scenario, macro_steps: list[float], progress: Progress) -> Reference:
@@ -319,7 +320,7 @@ def summary(coupled: Coupled) -> dict[str, Any]:
         "unconverged_steps": log.unconverged,
         "left_the_groove": coupled.fallen,
         "interface_work_J": {name: float(work[-1]) for name, work in log.energy.items()},
-        "extremes": {name: _extremes(log.time, log.signal(name)) for name in log.signals},
+        "extremes": {n: _extremes(log.time, values) for n, values in coupled.table.items() if n != "time"},
     }
 
 
@@ -371,7 +372,7 @@ def write_comparison(directory: RunDirectory, comparison: Comparison, runs: list
     if reference.fields:
         directory.write_fields("reference.h5", reference.fields, FIELD_UNITS)
     for coupled in runs:
-        write(RunDirectory(directory.path / coupled.record.label), coupled, reference)
+        write(RunDirectory(directory.path / coupled.label), coupled, reference)
     directory.write_json("comparison.json", comparison.content())
     draw_comparison(directory.path, comparison, [coupled.record for coupled in runs])
     error = "; ".join(failures) or None

@@ -19,7 +19,7 @@ import matplotlib.pyplot as plt
 import numpy as np
 from matplotlib.axes import Axes
 from matplotlib.figure import Figure
-from matplotlib.ticker import LogLocator, MaxNLocator
+from matplotlib.ticker import LogLocator, MaxNLocator, NullLocator
 
 from orchestrator.compare import Comparison, matching_rows
 from orchestrator.results import Table, replacing
@@ -37,7 +37,7 @@ BLACK, ORANGE, SKY, GREEN, BLUE, VERMILION, PURPLE = (
 COLOURS = (VERMILION, BLUE, GREEN, ORANGE, PURPLE, SKY)
 MARKERS = ("o", "s", "^", "D", "v", "P")
 GREY = "0.45"
-STYLE = {
+STYLE: dict[Any, Any] = {
     "font.size": 9,
     "axes.labelsize": 9,
     "axes.linewidth": 0.7,
@@ -108,8 +108,8 @@ def overview(path: Path, run: Table, reference: Table | None, panels: Sequence[P
 def _signal_panel(axis: Axes, panel: Panel, run: Table, reference: Table | None) -> None:
     if reference is not None:
         axis.plot(reference["time"], _shown(panel, reference), color="0.6", linewidth=2.6, label="Monolithic")
-    style = {"linestyle": (0, (4, 2))} if reference is not None else {}
-    axis.plot(run["time"], _shown(panel, run), color=VERMILION, linewidth=1.1, label="Coupled", **style)
+    line = (0, (4, 2)) if reference is not None else "-"
+    axis.plot(run["time"], _shown(panel, run), color=VERMILION, linewidth=1.1, label="Coupled", linestyle=line)
     axis.set_ylabel(f"{panel.label} [{panel.unit}]")
     axis.yaxis.set_major_locator(MaxNLocator(5))
     axis.set_xlim(run["time"][0], run["time"][-1])
@@ -119,8 +119,7 @@ def _difference_panel(axis: Axes, panel: Panel, run: Table, reference: Table) ->
     difference = _difference(panel.signal, run, reference) * panel.factor
     axis.semilogy(run["time"], _above_zero(difference), color=BLUE, linewidth=0.9)
     axis.set_ylabel(f"|Difference| [{panel.unit}]")
-    axis.yaxis.set_major_locator(LogLocator(numticks=5))
-    axis.minorticks_off()
+    _decades(axis, [difference])
 
 
 def _shown(panel: Panel, table: Table) -> np.ndarray:
@@ -131,6 +130,15 @@ def _shown(panel: Panel, table: Table) -> np.ndarray:
 
 def _difference(signal: str, run: Table, reference: Table) -> np.ndarray:
     return np.abs(run[signal] - reference[signal][matching_rows(reference["time"], run["time"])])
+
+
+def _decades(axis: Axes, curves: Sequence[np.ndarray]) -> None:
+    """Let a logarithmic axis end three decades below the smallest peak, not in zero crossings."""
+    peaks = [peak for curve in curves if (peak := np.max(curve, initial=0.0)) > 0.0 and np.isfinite(peak)]
+    if peaks:
+        axis.set_ylim(1e-3 * min(peaks), 3.0 * max(peaks))
+    axis.yaxis.set_major_locator(LogLocator(numticks=6))
+    axis.minorticks_off()
 
 
 def _above_zero(values: np.ndarray) -> np.ndarray:
@@ -148,124 +156,123 @@ def errors(path: Path, runs: Mapping[str, Table], reference: Table, panels: Sequ
     with _figure(path, (6.4, 1.7 * len(panels) + 0.6)) as figure:
         axes = figure.subplots(len(panels), 1, sharex=True, squeeze=False)[:, 0]
         for axis, panel in zip(axes, panels, strict=True):
-            for (label, run), colour in zip(runs.items(), _cycle(COLOURS), strict=False):
-                difference = _difference(panel.signal, run, reference) * panel.factor
-                axis.semilogy(run["time"], _above_zero(difference), color=colour, linewidth=0.9, label=label)
+            curves = [_difference(panel.signal, run, reference) * panel.factor for run in runs.values()]
+            for (label, run), curve, colour in zip(runs.items(), curves, _cycle(COLOURS), strict=False):
+                axis.semilogy(run["time"], _above_zero(curve), color=colour, linewidth=0.9, label=label)
+            _decades(axis, curves)
             axis.set_ylabel(f"|Δ {panel.label}|\n[{panel.unit}]")
-            axis.yaxis.set_major_locator(LogLocator(numticks=5))
-            axis.minorticks_off()
             axis.set_xlim(reference["time"][0], reference["time"][-1])
         axes[-1].set_xlabel("Time [s]")
-        figure.legend(
-            *axes[0].get_legend_handles_labels(), loc="outside upper center", ncols=min(4, len(runs))
-        )
+        figure.legend(*axes[0].get_legend_handles_labels(), loc="outside upper center", ncols=min(4, len(runs)))
         figure.align_ylabels(axes)
 
 
-def convergence(path: Path, comparison: Comparison, signals: Sequence[str]) -> None:
-    """Draw the relative error of every master over the macro step, with a guide of the observed slope."""
-    with _figure(path, (3.3 * len(signals) + 0.4, 3.1)) as figure:
-        axes = figure.subplots(1, len(signals), squeeze=False)[0]
-        for axis, signal in zip(axes, signals, strict=True):
-            masters = dict.fromkeys(run.master for run in comparison.runs)
+def convergence(path: Path, comparison: Comparison) -> None:
+    """Draw the relative error of every master over the macro step, with its slope and what is allowed."""
+    masters = dict.fromkeys(run.master for run in comparison.runs)
+    with _figure(path, (3.4 * len(comparison.tolerance) + 0.4, 3.2)) as figure:
+        axes = figure.subplots(1, len(comparison.tolerance), squeeze=False)[0]
+        for axis, (signal, tolerance) in zip(axes, comparison.tolerance.items(), strict=True):
             for master, colour, marker in zip(masters, _cycle(COLOURS), _cycle(MARKERS), strict=False):
                 _convergence_line(axis, comparison, master, signal, colour, marker)
-            if signal in comparison.tolerance:
-                axis.axhline(comparison.tolerance[signal], color=GREY, linewidth=0.9, linestyle=":")
-            axis.set_xlabel("Macro step [s]")
-            axis.set_ylabel(f"Relative error of\n{signal} [–]")
+            axis.axhline(tolerance, color=GREY, linewidth=0.9, linestyle=":")
+            where = axis.get_yaxis_transform()
+            axis.text(0.99, tolerance, "allowed", transform=where, ha="right", va="bottom", color=GREY, fontsize=8)
+            _macro_step_axis(axis, comparison)
+            axis.set_ylabel(f"Relative error, {_words(signal)} [–]")
         handles, labels = axes[0].get_legend_handles_labels()
         figure.legend(handles, labels, loc="outside upper center", ncols=min(4, len(labels)))
 
 
-def _convergence_line(
-    axis: Axes, comparison: Comparison, master: str, signal: str, colour: str, marker: str
-) -> None:
+def _words(signal: str) -> str:
+    """Return what a panel calls `signal`, or its own name."""
+    return next((panel.label for panel in LANDING if panel.signal == signal), signal)
+
+
+def _macro_step_axis(axis: Axes, comparison: Comparison) -> None:
+    """Let the axis show the macro steps that were run, in ms, and nothing else."""
+    steps = sorted({run.macro_step for run in comparison.runs})
+    axis.set_xticks(steps, [f"{1e3 * step:g}" for step in steps])
+    axis.xaxis.set_minor_locator(NullLocator())
+    axis.set_xlim(steps[0] / 1.25, steps[-1] * 1.25)
+    axis.set_xlabel("Macro step [ms]")
+
+
+def _convergence_line(axis: Axes, comparison: Comparison, master: str, signal: str, colour: str, marker: str) -> None:
     runs = [run for run in comparison.runs if run.master == master and signal in run.signals]
     points = sorted((run.macro_step, run.signals[signal].relative_max_error) for run in runs)
     steps, values = np.array(points).reshape(-1, 2).T
     axis.loglog(steps, _above_zero(values), color=colour, marker=marker, markersize=4.5, label=master)
     order = comparison.observed_order.get(master, {}).get(signal, np.nan)
     if np.isfinite(order):
-        guide = np.round(order) if order >= 0.5 else order
-        line = values[-1] * (steps / steps[-1]) ** guide
-        axis.loglog(steps, line, color=colour, linewidth=0.7, linestyle="--")
-        axis.annotate(
-            f"slope {guide:.2g}",
-            (steps[0], line[0]),
-            (4, -10),
-            textcoords="offset points",
-            color=colour,
-            fontsize=8,
-        )
+        middle = float(np.sqrt(steps[0] * steps[-1])), float(np.sqrt(values[0] * values[-1]))
+        axis.annotate(f"slope {order:.1f}", middle, (6, -12), textcoords="offset points", color=colour, fontsize=8)
 
 
-def iterations(path: Path, tables: Mapping[str, Table]) -> None:
-    """Draw the iterations of every macro step, and mark the steps that did not converge."""
+def iterations(path: Path, tables: Mapping[str, Table], bins: int = 250) -> None:
+    """Draw the iterations of a macro step, mean and range; crosses are unconverged steps."""
     with _figure(path, (6.4, 2.6)) as figure:
         axis = figure.subplots()
         for (label, table), colour in zip(tables.items(), _cycle(COLOURS), strict=False):
-            axis.step(
-                table["time"],
-                table["iterations"],
-                where="pre",
-                color=colour,
-                linewidth=0.7,
-                alpha=0.9,
-                label=label,
-            )
+            groups = np.array_split(np.arange(len(table["time"])), min(bins, len(table["time"])))
+            time = [table["time"][group[-1]] for group in groups]
+            counts = [table["iterations"][group] for group in groups]
+            low, mean, high = ([f(c) for c in counts] for f in (np.min, np.mean, np.max))
+            axis.fill_between(time, low, high, step="pre", color=colour, alpha=0.25, linewidth=0.0)
+            axis.step(time, mean, where="pre", color=colour, linewidth=1.0, label=label)
             missed = table["converged"] == 0
-            if missed.any():
-                axis.plot(
-                    table["time"][missed],
-                    table["iterations"][missed],
-                    "x",
-                    color=BLACK,
-                    markersize=5,
-                    clip_on=False,
-                )
+            axis.plot(table["time"][missed], table["iterations"][missed], "x", color=BLACK, markersize=5)
         axis.set_xlabel("Time [s]")
         axis.set_ylabel("Iterations per macro step [–]")
         axis.set_ylim(bottom=0)
         axis.yaxis.set_major_locator(MaxNLocator(integer=True))
         axis.margins(x=0.0)
-        figure.legend(loc="outside upper center", ncols=4)
+        figure.legend(loc="outside upper center", ncols=min(4, len(tables)))
 
 
-def shapes(path: Path, fields: Mapping[str, np.ndarray], run: Table, instants: int = 6) -> None:
-    """Draw the cable in its vertical plane, with the robot's reference point, at some instants.
+def shapes(path: Path, fields: Mapping[str, np.ndarray], run: Table) -> None:
+    """Draw the cable in its vertical plane and its displacement since the start, at some instants.
+
+    Dots are the robot's reference point.
 
     Parameters
     ----------
     fields : ``time`` (n,) s, ``position`` (n, m, 3) m
     """
     time, position = fields["time"], fields["position"]
-    rows = _telling_instants(run, time, instants)
+    rows = _telling_instants(run, time)
     colours = matplotlib.colormaps["viridis"](np.linspace(0.0, 0.9, len(rows)))
-    with _figure(path, (6.8, 3.2)) as figure:
-        axis = figure.subplots()
+    with _figure(path, (6.8, 4.4)) as figure:
+        shape, change = figure.subplots(2, 1, sharex=True)
         for row, colour in zip(rows, colours, strict=True):
-            axis.plot(position[row, :, 1], position[row, :, 2], color=colour, label=f"{time[row]:.2f} s")
+            y, z = position[row, :, 1], position[row, :, 2]
+            shape.plot(y, z, color=colour, label=f"{time[row]:.2f} s")
             k = int(np.argmin(np.abs(run["time"] - time[row])))
             robot = run["robot.body.position.y"][k], run["robot.body.position.z"][k]
-            axis.plot(*robot, marker="o", markersize=6, markeredgecolor="white", color=colour)
-        axis.set_xlabel("Y, along the span [m]")
-        axis.set_ylabel("Z [m]")
-        axis.margins(x=0.01)
-        figure.legend(loc="outside right center", title="Time", alignment="left")
+            shape.plot(*robot, marker="o", markersize=6, markeredgecolor="white", color=colour)
+            change.plot(y, z - position[0, :, 2], color=colour)
+        shape.set_ylabel("Z [m]")
+        change.set_ylabel("Z displacement [m]")
+        change.set_xlabel("Y, along the span [m]")
+        change.margins(x=0.01)
+        figure.align_ylabels()
+        figure.legend(*shape.get_legend_handles_labels(), loc="outside right center", title="Time")
 
 
-def _telling_instants(run: Table, time: np.ndarray, count: int) -> list[int]:
-    """Return rows of `time`: start, largest descent, end, and instants spread evenly over what is left."""
-    lowest = run["time"][int(np.argmin(run["robot.body.position.z"]))]
-    wanted = [time[0], lowest, *np.linspace(lowest, time[-1], max(2, count - 1))[1:]]
+def _telling_instants(run: Table, time: np.ndarray) -> list[int]:
+    """Return rows of `time`: the start, two on the way to the lowest point, that, the rebound, the end."""
+    z = run["robot.body.position.z"]
+    lowest = int(np.argmin(z))
+    rebound = lowest + int(np.argmax(z[lowest:]))
+    fall = run["time"][lowest] - time[0]
+    wanted = [time[0], time[0] + fall / 3, time[0] + 2 * fall / 3, *run["time"][[lowest, rebound, -1]]]
     return sorted({int(np.argmin(np.abs(time - t))) for t in wanted})
 
 
 @contextmanager
 def _figure(path: Path, size: tuple[float, float]) -> Iterator[Figure]:
     """Give a figure in the house style and save it, whole or not at all."""
-    with plt.rc_context(STYLE):
+    with matplotlib.rc_context(STYLE):
         figure = plt.figure(figsize=size)
         try:
             yield figure

@@ -29,14 +29,20 @@ img{{max-width:100%;margin:1em 0}}</style>
 class Record:
     """What one run leaves to be drawn: its signals, its macro steps, its fields."""
 
-    label: str
+    master: str
+    macro_step: float
     table: Table
     steps: Table
     fields: dict[str, np.ndarray] = field(default_factory=dict)
 
+    @property
+    def legend(self) -> str:
+        """Master and macro step, for people."""
+        return f"{self.master}, {1e3 * self.macro_step:g} ms"
+
 
 def run_label(master: str, macro_step: float) -> str:
-    """Return master and macro step as legends and folders show them."""
+    """Return master and macro step, as folders are called."""
     return f"{master}_{macro_step:g}s"
 
 
@@ -49,7 +55,7 @@ def draw_run(directory: Path, record: Record, reference: Table | None, signals: 
     folder = directory / "plots"
     panels = plots.panels_for(record.table, reference, signals)
     plots.overview(folder / "overview.png", record.table, reference, panels)
-    plots.iterations(folder / "iterations.png", {record.label: record.steps})
+    plots.iterations(folder / "iterations.png", {record.legend: record.steps})
     if record.fields and "robot.body.position.z" in record.table:
         plots.shapes(folder / "shapes.png", record.fields, record.table)
 
@@ -64,12 +70,12 @@ def draw_comparison(directory: Path, comparison: Comparison, records: Sequence[R
     folder, reference, signals = directory / "plots", comparison.reference.table, list(comparison.tolerance)
     panels = plots.panels_for(records[0].table, reference, signals)
     plots.overview(folder / "overview.png", records[0].table, reference, panels)
-    plots.errors(folder / "errors.png", {r.label: r.table for r in records}, reference, panels)
-    plots.iterations(folder / "iterations.png", {r.label: r.steps for r in records})
+    plots.errors(folder / "errors.png", {r.legend: r.table for r in records}, reference, panels)
+    plots.iterations(folder / "iterations.png", {r.legend: r.steps for r in records})
     if records[0].fields and "robot.body.position.z" in records[0].table:
         plots.shapes(folder / "shapes.png", records[0].fields, records[0].table)
     if len({run.macro_step for run in comparison.runs}) > 1 and signals:
-        plots.convergence(folder / "convergence.png", comparison, signals)
+        plots.convergence(folder / "convergence.png", comparison)
 
 
 def report(directory: Path) -> Path:
@@ -94,7 +100,8 @@ def read_record(directory: Path) -> Record:
     """Return what the run in `directory` left."""
     summary = read_json(directory / "summary.json")
     return Record(
-        run_label(summary["master"], summary["macro_step"]),
+        summary["master"],
+        summary["macro_step"],
         read_table(directory / "results.csv"),
         read_table(directory / "iterations.csv"),
         read_fields(directory / "fields.h5"),

@@ -70,9 +70,7 @@ class RunDirectory:
 
     def write_manifest(self, content: Mapping[str, Any], error: str | None = None) -> None:
         """Write ``manifest.json``, the last file; with `error` the run is marked as incomplete."""
-        self.write_json(
-            "manifest.json", {"complete": error is None, "error": error, **content, **circumstances()}
-        )
+        self.write_json("manifest.json", {"complete": error is None, "error": error, **content, **circumstances()})
 
 
 @contextmanager
@@ -121,7 +119,7 @@ def read_fields(path: Path) -> dict[str, np.ndarray]:
     import h5py
 
     with h5py.File(path) as file:
-        return {key: np.asarray(file[key]) for key in file}
+        return {str(key): np.asarray(file[key]) for key in file}
 
 
 def circumstances() -> dict[str, Any]:

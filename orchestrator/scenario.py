@@ -480,9 +480,7 @@ def _choice_problems(document: Document) -> Iterator[Problem]:
 def _step_problems(document: Document) -> Iterator[Problem]:
     simulation = _table(document, "simulation")
     stop, step = simulation.get("stop_time"), simulation.get("macro_step")
-    if not (
-        _is_number(stop) and _is_number(step) and 0.0 < step < float("inf") and 0.0 < stop < float("inf")
-    ):
+    if not (_is_number(stop) and _is_number(step) and 0.0 < step < float("inf") and 0.0 < stop < float("inf")):
         return
     n = max(1, round(stop / step))
     if abs(n * step - stop) > 1e-9 * stop:
@@ -501,9 +499,7 @@ def _position_problems(document: Document) -> Iterator[Problem]:
     if span is None and "fmu" not in _table(document, "cable"):
         span = vocabulary.of_module("cable")["span"].start
     if _is_number(position) and _is_number(span) and not 0 < position < span:
-        yield Problem(
-            "landing.position", f"{position:g} m is off the span; it must lie within 0 … {span:g} m"
-        )
+        yield Problem("landing.position", f"{position:g} m is off the span; it must lie within 0 … {span:g} m")
 
 
 def _table(document: Document, key: str) -> Document:

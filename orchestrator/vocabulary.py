@@ -37,11 +37,17 @@ def of_module(kind: str, robot: str | None = None) -> dict[str, Variable]:
 
         table = Contact.table
     else:
-        from fmus.robot.module import robot_table
         from orchestrator.robots import load_robot
 
-        table = robot_table(load_robot(robot).n_wheels if robot in robots() else 1)
+        return robot_variables(load_robot(robot).n_wheels if robot in robots() else 1)
     return {v.name: v for v in table.variables}
+
+
+def robot_variables(n_wheels: int) -> dict[str, Variable]:
+    """Return the variables of our robot module with `n_wheels` wheels by name."""
+    from fmus.robot.module import robot_table
+
+    return {v.name: v for v in robot_table(n_wheels).variables}
 
 
 def of_fmu(path: Path) -> dict[str, Variable]:
