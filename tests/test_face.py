@@ -23,7 +23,7 @@ sys.path[:0] = [str(TESTS), str(TESTS / "modules")]
 
 from fmi import Instance  # noqa: E402
 
-from fmus.build import build_fmu, ensure_fmu, is_stale, rename_imports  # noqa: E402
+from fmus.build import build_fmu, ensure_fmu, ensure_fmus, is_stale, rename_imports  # noqa: E402
 from fmus.model_description import base_unit  # noqa: E402
 from fmus.recipe import FmuRecipe  # noqa: E402
 from fmus.variables import ModuleError  # noqa: E402
@@ -252,7 +252,7 @@ def test_many_instances(folder):
     for _ in range(30):  # pythonfmu releases the script's namespace at each instantiation
         with Instance(folder) as one:
             one.initialize().run(0.0, 0.1, 1)
-        gc.collect()
+    gc.collect()
 
 
 # --- the build -------------------------------------------------------------------------------------------
@@ -276,6 +276,13 @@ def test_only_what_is_stale_is_built(path):
     assert is_stale(path, dataclasses.replace(RECIPE, start={"damping": 0.4}))
     assert is_stale(path.with_name("missing.fmu"), RECIPE)
     assert is_stale(Path(__file__), RECIPE)
+
+
+def test_many_are_built_at_once(path, tmp_path):
+    twice = ensure_fmus([RECIPE, dataclasses.replace(RECIPE, name="twin"), RECIPE], tmp_path)
+    assert [p.name for p in twice] == ["oscillator.fmu", "twin.fmu", "oscillator.fmu"]
+    assert twice[0].read_bytes() == path.read_bytes()
+    assert sorted(p.name for p in tmp_path.iterdir()) == ["oscillator.fmu", "twin.fmu"]
 
 
 def test_wrong_start_value_leaves_no_file(tmp_path):
