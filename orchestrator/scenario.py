@@ -437,6 +437,8 @@ def _own(kind: str, section: Document) -> dict[str, vocabulary.Variable]:
 
 
 def _value_problems(path: str, variable: vocabulary.Variable, value: Any) -> Iterator[Problem]:
+    if not isinstance(value, Scalar):
+        return  # the types have said so
     wanted = {"real": (int, float), "integer": int, "boolean": bool, "string": str}[variable.kind]
     is_bool = isinstance(value, bool)
     if not isinstance(value, wanted) or is_bool != (variable.kind == "boolean"):
@@ -469,12 +471,22 @@ def _choice_problems(document: Document) -> Iterator[Problem]:
     masters = vocabulary.masters()
     if isinstance(name, str) and name not in masters:
         yield Problem("simulation.master", f"no master {name!r}{nearest(name, masters)}")
-    for key in options if name in masters else ():
+    for key, value in options.items() if name in masters else ():
         if key not in masters[name]:
             yield Problem(f"master.{key}", f"unknown key for master {name}{nearest(key, masters[name])}")
+        elif not _is_like(value, masters[name][key]):
+            wanted = type(masters[name][key]).__name__
+            yield Problem(f"master.{key}", f"{value!r} is not of type {wanted}")
     robots = vocabulary.robots()
     if isinstance(model, str) and model not in robots:
         yield Problem("robot.model", f"no robot {model!r} in the catalogue{nearest(model, robots)}")
+
+
+def _is_like(value: Any, default: Any) -> bool:
+    """Whether `value` is of the type of `default`; a whole number may stand for a real one."""
+    if isinstance(default, float):
+        return _is_number(value)
+    return type(value) is type(default) or default is None
 
 
 def _step_problems(document: Document) -> Iterator[Problem]:
@@ -498,7 +510,7 @@ def _position_problems(document: Document) -> Iterator[Problem]:
     span = _table(_table(document, "cable"), "parameters").get("span")
     if span is None and "fmu" not in _table(document, "cable"):
         span = vocabulary.of_module("cable")["span"].start
-    if _is_number(position) and _is_number(span) and not 0 < position < span:
+    if _is_number(position) and _is_number(span) and 0 < span < float("inf") and not 0 < position < span:
         yield Problem("landing.position", f"{position:g} m is off the span; it must lie within 0 … {span:g} m")
 
 
@@ -515,4 +527,4 @@ def _worded(problems: list[Problem], file: Path, replaced: list[str]) -> Iterato
 
 
 def _related(path: str, key: str) -> bool:
-    return path != "" and f"{key}.".startswith(f"{path}.")
+    return path != "" and (f"{key}.".startswith(f"{path}.") or path.startswith(f"{key}."))

@@ -80,17 +80,24 @@ def description(path: Path) -> Any:
         raise InputError(f"{path}: not an FMU: its modelDescription.xml cannot be read: {error}") from None
 
 
-def masters() -> dict[str, list[str]]:
-    """Return the options of every master by its name."""
+def masters() -> dict[str, dict[str, Any]]:
+    """Return the options of every master, with their default values, by its name."""
     from orchestrator.masters import MASTERS
 
     return {name: _options(master) for name, master in MASTERS.items()}
 
 
-def _options(master: type) -> list[str]:
-    """Return the names of the keyword arguments that `master` takes after the graph."""
-    parameters = list(signature(master).parameters.values())[1:]
-    return [p.name for p in parameters if p.kind in (p.KEYWORD_ONLY, p.POSITIONAL_OR_KEYWORD)]
+def _options(master: type) -> dict[str, Any]:
+    """Return the keyword arguments of `master`; those that it hands on are its base class's."""
+    found: dict[str, Any] = {}
+    for base in master.__mro__:
+        if "__init__" not in vars(base):
+            continue
+        parameters = signature(vars(base)["__init__"]).parameters.values()
+        found |= {p.name: p.default for p in parameters if p.kind is p.KEYWORD_ONLY and p.name not in found}
+        if not any(p.kind is p.VAR_KEYWORD for p in parameters):
+            break
+    return found
 
 
 def robots() -> list[str]:
