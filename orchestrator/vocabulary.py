@@ -3,6 +3,7 @@
 from __future__ import annotations
 
 import zipfile
+from importlib import import_module
 from inspect import signature
 from pathlib import Path
 from typing import Any
@@ -20,27 +21,28 @@ KINDS |= {
 }
 
 
+MODELS = {
+    "cable": ("fmus.cable.module", "Cable"),
+    "contact": ("fmus.contact.module", "Contact"),
+    "oscillator": ("fmus.oscillator.module", "Oscillator"),
+}
+"""Our modules with one table each: file and class."""
+
+
 def of_module(kind: str, robot: str | None = None) -> dict[str, Variable]:
     """Return the variables of our own module by name, from its table.
 
     Parameters
     ----------
-    kind : ``cable``, ``contact`` or ``robot``
+    kind : one of `MODELS`, or ``robot``
     robot : name of the catalogue; the number of its wheels decides which variables there are
     """
-    if kind == "cable":
-        from fmus.cable.module import Cable
-
-        table = Cable.table
-    elif kind == "contact":
-        from fmus.contact.module import Contact
-
-        table = Contact.table
-    else:
+    if kind == "robot":
         from orchestrator.robots import load_robot
 
         return robot_variables(load_robot(robot).n_wheels if robot in robots() else 1)
-    return {v.name: v for v in table.variables}
+    file, name = MODELS[kind]
+    return {v.name: v for v in getattr(import_module(file), name).table.variables}
 
 
 def robot_variables(n_wheels: int) -> dict[str, Variable]:
