@@ -38,7 +38,8 @@ lint: env
 	$(BIN)/lint-imports
 
 verify: env
-	$(BIN)/python -m pytest -q -m 'slow or not slow'
+	$(BIN)/python -m verification
+	$(BIN)/python -m pytest -q -m slow
 
 bench: env
 	@for file in benchmarks/*.py; do echo "== $$file"; $(BIN)/python "$$file"; done

@@ -24,7 +24,8 @@ import sys
 import tempfile
 import uuid
 import zipfile
-from collections.abc import Iterator, Mapping
+from collections.abc import Iterable, Iterator, Mapping
+from concurrent.futures import ThreadPoolExecutor
 from dataclasses import dataclass
 from pathlib import Path
 from typing import Any
@@ -55,6 +56,12 @@ def ensure_fmu(recipe: FmuRecipe, folder: Path) -> Path:
     """Build ``NAME.fmu`` in `folder` if it is missing or older than its sources; return its path."""
     with _locked(target(recipe, folder)) as path:
         return _build(recipe, path) if is_stale(path, recipe) else path
+
+
+def ensure_fmus(recipes: Iterable[FmuRecipe], folder: Path) -> list[Path]:
+    """Do so for many, as many at a time as there are processors; return their paths in the same order."""
+    with ThreadPoolExecutor(os.cpu_count()) as pool:
+        return list(pool.map(lambda recipe: ensure_fmu(recipe, folder), recipes))
 
 
 def target(recipe: FmuRecipe, folder: Path) -> Path:
@@ -302,8 +309,7 @@ def main() -> None:
         if options.assemble:
             write_atomically(options.assemble, assemble(FmuRecipe(**json.load(sys.stdin))))
         else:
-            for recipe in recipes():
-                print(ensure_fmu(recipe, options.out))
+            print(*ensure_fmus(recipes(), options.out), sep="\n")
     except ModuleError as error:
         sys.exit(str(error))
 

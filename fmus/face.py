@@ -116,8 +116,8 @@ def _take_references(objects: Iterable[object]) -> None:
 def _drop_interpreter_guard(resources: str | None) -> None:
     """Let the FMU's library forget that it watches over the interpreter.
 
-    Its guard is destroyed twice when the process ends (by a static destructor and by the library's own), which
-    aborts a finished run. Where Python itself is the host the guard has nothing to do, and
+    Its guard is destroyed twice when the process ends (by a static destructor and by the library's own),
+    which aborts a finished run. Where Python itself is the host the guard has nothing to do, and
     `finalizePythonInterpreter` removes it.
     """
     if not sys.orig_argv or not sys.platform.startswith("linux") or resources is None:
@@ -150,6 +150,7 @@ class ModuleSlave(Fmi2Slave):
         self._initialized_with = b""
         self._start_time = 0.0
         self._dirty = False
+        self._reported = ""
         self._enter(Phase.INSTANTIATED)
 
     # --- life cycle -------------------------------------------------------------------------------------
@@ -246,13 +247,15 @@ class ModuleSlave(Fmi2Slave):
     def _report(self, place: str, error: Exception, status: Fmi2Status) -> None:
         """Log what went wrong; the log text is a printf format."""
         message = self._describe(place, error)
-        LOGGER.error(message)
+        if message != self._reported:  # a master may ask again and again
+            LOGGER.error(message)
+        self._reported = message
         if not isinstance(error, ModuleError):
             message += "\n" + "".join(traceback.format_exception(error))
         self.log(message.replace("%", "%%"), status)
 
     def _fatal(self, place: str, error: Exception) -> FmuError:
-        """Return the exception to raise; the queue is emptied: pythonfmu would flush it with the error set."""
+        """Return the exception to raise; the queue is emptied: pythonfmu would flush it with an error set."""
         message = self._describe(place, error)
         LOGGER.error(message, exc_info=None if isinstance(error, ModuleError) else error)
         pending = [item.msg for item in self.log_queue]

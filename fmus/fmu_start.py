@@ -1,9 +1,10 @@
 """How an FMU finds its physics; the text of this file opens the script inside every FMU.
 
 All FMUs of a process share one interpreter and one module cache, so that two FMUs with a module of the same
-name would run the first one's code. The installed package is therefore used only if it is, byte for byte, what
-the FMU was built from. Else the copy inside the FMU is used, under a name made of its own hash; it is kept in a
-folder of the user, so that compiled kernels are found again at the next start. Standard library only.
+name would run the first one's code. The installed package is therefore used only if it is, byte for byte,
+what the FMU was built from. Else the copy inside the FMU is used, under a name made of its own hash; it is
+kept in a folder of the user, so that compiled kernels are found again at the next start.
+Standard library only.
 """
 
 from __future__ import annotations

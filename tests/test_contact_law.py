@@ -107,7 +107,9 @@ def test_walls_against_adaptive_quadrature(seed):
     assert out[12] == pytest.approx(scale, rel=4e-6, abs=1e-12)
 
 
-@pytest.mark.parametrize(("n", "cut", "error"), [(1.0, 1.0, 1e-14), (1.5, 1.0, 4e-5), (2.5, 1.0, 4e-6), (2.5, 0.9, 1e-7)])
+@pytest.mark.parametrize(
+    ("n", "cut", "error"), [(1.0, 1.0, 1e-14), (1.5, 1.0, 4e-5), (2.5, 1.0, 4e-6), (2.5, 0.9, 1e-7)]
+)
 def test_rule_of_the_touched_piece(n, cut, error):
     """A load (1 - x^2)^n ending at zero or cut off: Gauss-Legendre converges like 1 / points^(2 n + 2)."""
     exact = quad(lambda x: (1 - x * x) ** n, -cut, cut, epsabs=1e-15, epsrel=1e-13)[0]
@@ -136,7 +138,7 @@ def test_lateral_self_centring():
 
 
 def test_yaw_restoring_moment():
-    """Small yaw psi: the walls' difference over x, and the radial forces at the lever psi x, both turn back."""
+    """Small yaw psi: the walls' difference over x and the radial forces at the lever psi x turn back."""
     depth, psi, k, l0 = 3e-3, 1e-6, 1e8, 0.06
     motion = wheel_above(depth)
     motion[3:6] = math.sin(psi), math.cos(psi), 0.0  # right-handed turn about z is -psi
@@ -182,6 +184,23 @@ def test_never_pulls_and_dissipates(seed, damping):
     assert math.hypot(out[13], out[14]) <= 0.7 * out[12] * (1 + 1e-12)
 
 
+@settings(max_examples=200, deadline=None)
+@given(seed=st.integers(0, 2**32 - 1))
+def test_any_pose_gives_finite_passive_forces(seed):
+    """Wheels upside down, along the cable, through it: the law stays defined."""
+    rng = np.random.default_rng(seed)
+    motion = rng.normal(size=24)
+    motion[12:15] = motion[0:3] + 0.05 * rng.normal(size=3)
+    motion[15:18] /= np.linalg.norm(motion[15:18])
+    if seed % 3 == 0:
+        motion[15:18] = motion[3:6] / np.linalg.norm(motion[3:6])
+    out = wrench(motion, 1e-3 * rng.normal(size=2))
+    assert np.isfinite(out).all()
+    assert out[12] >= 0.0 and out[23] >= 0.0 and 0.0 <= out[18] <= 0.06 * (1 + 1e-12)
+    about_wheel = out[3:6] + np.cross(motion[0:3] - motion[12:15], out[0:3])
+    np.testing.assert_allclose(about_wheel + out[9:12], 0.0, atol=1e-12 * (out[12] + 1e-9))
+
+
 @settings(max_examples=60, deadline=None)
 @given(seed=st.integers(0, 2**32 - 1))
 def test_action_is_reaction(seed):
@@ -206,18 +225,20 @@ def test_turned_and_mirrored_motion_gives_turned_and_mirrored_wrench(seed):
     tolerance = 1e-9 * (1.0 + out[12])
     np.testing.assert_allclose(after[:12], turned(out[:12], rotation), atol=tolerance)
     np.testing.assert_allclose(after[12:27], out[12:27], atol=tolerance)
-    # mirrored in x: polar vectors change x, axial vectors (moment, angular velocity) change y and z; the mirrored
-    # axle -x is the same wheel as +x, which turns round the lateral bristle
+    # mirrored in x: polar vectors change x, axial vectors (moment, angular velocity) change y and z; the
+    # mirrored axle -x is the same wheel as +x, which turns round the lateral bristle
     polar, axial = np.array([-1.0, 1.0, 1.0]), np.array([1.0, -1.0, -1.0])
     mirror = np.concatenate([polar, polar, polar, polar, polar, -polar, polar, axial])
     image = wrench(mirror * motion, slip * [1.0, -1.0])
-    np.testing.assert_allclose(image[:12], np.concatenate([polar, axial, polar, axial]) * out[:12], atol=tolerance)
+    np.testing.assert_allclose(
+        image[:12], np.concatenate([polar, axial, polar, axial]) * out[:12], atol=tolerance
+    )
     assert image[14] == pytest.approx(-out[14], abs=tolerance)
 
 
 @pytest.mark.parametrize("length", [1e-7, 0.06])
 def test_smooth_at_touch(length):
-    """C2 in the depth: force / depth^2 falls with depth^(1/2) or faster, so the second derivative starts at 0."""
+    """C2 in the depth: force / depth^2 falls like depth^(1/2) or faster, so F'' starts at 0."""
     depths = np.array([1e-4, 1e-5, 1e-6])
     forces = np.array([wrench(wheel_above(d), max_contact_length=length)[12] for d in depths])
     assert np.all(np.diff(np.log(forces)) / np.diff(np.log(depths)) >= 2.5 - 1e-3)
@@ -243,7 +264,9 @@ def test_restitution_of_hunt_crossley():
         run = solve_ivp(fall, (0, 1), [0.0, speed], events=lift, rtol=1e-10, atol=1e-14, max_step=1e-3)
         E = SIN
         before = E * speed - math.log(1 + E * speed)
-        after = brentq(lambda v, E=E, c=before: -E * v - math.log(1 - E * v) - c, 1e-9, min(speed, (1 - 1e-12) / E))
+        after = brentq(
+            lambda v, E=E, c=before: -E * v - math.log(1 - E * v) - c, 1e-9, min(speed, (1 - 1e-12) / E)
+        )
         assert -run.y[1, -1] == pytest.approx(after, rel=1e-6)
 
 
@@ -263,7 +286,7 @@ def test_friction_sticks_up_to_the_coulomb_limit():
 
 
 def test_wedge_raises_sliding_friction():
-    """Walls carry W = N sin(theta/2), friction is mu N: sliding along the cable takes mu / sin(theta/2) of the load."""
+    """Walls carry W = N sin(theta/2), friction is mu N: sliding takes mu / sin(theta/2) of the load."""
     motion = wheel_above(4e-3, slip_rate=(0.5, 0.0))
     out = wrench(motion, (1.0, 0.0), max_contact_length=1e-7, damping=0.0)
     assert out[19] == SLIP

@@ -234,9 +234,9 @@ def collocation_step(model, method, state, h, offset, ports, tolerance, fresh, w
             for j in range(2):
                 increment = 2.0 * (method.from_mode[j] * work.mode[i]).real
                 work.a[j, i] += increment
+                if not abs(increment) < np.inf:
+                    return NOT_CONVERGED
                 change = max(change, scale * abs(increment))
-        if not change < np.inf:
-            return NOT_CONVERGED
         rate = change / previous if iteration > 0 else 1.0
         if _finished(change, rate, tolerance):
             break
@@ -294,9 +294,9 @@ def generalized_alpha_step(model, method, state, h, offset, ports, tolerance, fr
         change = 0.0
         for i in range(n):
             a1[i] += work.increment[i]
+            if not abs(work.increment[i]) < np.inf:
+                return NOT_CONVERGED
             change = max(change, cq * abs(work.increment[i]))
-        if not change < np.inf:
-            return NOT_CONVERGED
         rate = change / previous if iteration > 0 else 1.0
         if _finished(change, rate, tolerance):
             break

@@ -1,8 +1,8 @@
-"""The contact over a macro step: the motion rebuilt inside it, the law sampled along it, mean force and slope.
+"""The contact over a macro step: the motion inside it, the law along it, the force's mean and slope.
 
-Everything is a polynomial in sigma = (tau - t) / h. A *path* (4, 15) holds the coefficients of 1, sigma, sigma^2,
-sigma^3 of cable point p 0:3, tangent 3:6, wheel centre 6:9, axle 9:12 and of the wheel's rotation since t 12:15.
-The equations stand in README.md of this folder.
+Everything is a polynomial in sigma = (tau - t) / h. A *path* (4, 15) holds the coefficients of 1, sigma,
+sigma^2, sigma^3 of cable point p 0:3, tangent 3:6, wheel centre 6:9, axle 9:12 and of the wheel's rotation
+since t 12:15. The equations stand in README.md of this folder.
 """
 
 from __future__ import annotations
@@ -10,6 +10,7 @@ from __future__ import annotations
 import math
 
 import numpy as np
+from numpy.polynomial import legendre
 
 from fmus.contact.law import LEFT, OK, SLIP, axle, foot, friction, lateral, walls
 from fmus.jit import kernel
@@ -51,14 +52,16 @@ def gauss_rule(n: int) -> tuple[np.ndarray, np.ndarray, np.ndarray]:
     Returns
     -------
     nodes, weights : (n,)
-    increments : (n + 1, n); row i integrates the interpolating polynomial from node i - 1 (or 0) to node i (or 1)
+    increments : (n + 1, n); row i integrates the interpolant from node i - 1 (or 0) to node i (or 1)
     """
-    x, w = np.polynomial.legendre.leggauss(n)
-    nodes, weights = 0.5 * (x + 1.0), 0.5 * w
-    powers = np.arange(1, n + 1)
-    ends = np.concatenate([nodes, [1.0]])
-    integrals = (ends[:, None] ** powers / powers) @ np.linalg.inv(nodes[:, None] ** (powers - 1))
-    return nodes, weights, np.diff(integrals, axis=0, prepend=0.0)
+    x, w = legendre.leggauss(n)
+    ends = np.append(x, 1.0)
+    # the interpolant in Legendre polynomials, integrated from -1 by (2k + 1) int P_k = P_{k+1} - P_{k-1}
+    antiderivative = legendre.legvander(ends, n)[:, 1:]
+    antiderivative[:, 1:] -= legendre.legvander(ends, n - 2)
+    antiderivative[:, 0] += 1.0
+    integrals = 0.25 * antiderivative @ (legendre.legvander(x, n - 1).T * w)
+    return 0.5 * (x + 1.0), 0.5 * w, np.diff(integrals, axis=0, prepend=0.0)
 
 
 @kernel
@@ -92,7 +95,7 @@ def waveform_path(start, inputs, path):
 
 @kernel
 def _rotation_given(inputs):
-    """Tell whether the wheel's rotation over the step is connected: it is never zero while the wheel turns."""
+    """Tell whether the wheel's rotation over the step is connected: it is not zero when it turns."""
     return inputs[_ROTATION] != 0.0 or inputs[_ROTATION + 1] != 0.0 or inputs[_ROTATION + 2] != 0.0
 
 
@@ -158,7 +161,7 @@ def _work(path, first, h, force, o):
 
 @kernel
 def _tangent_work(motion, dt, ds, force, o):
-    """Return the work in dt of the cable's moment (at ds from the middle of the step) on the tangent's rotation."""
+    """Return the work in dt, at ds from the middle of the step, of the moment on the tangent's rotation."""
     squared = motion[3] ** 2 + motion[4] ** 2 + motion[5] ** 2
     work = 0.0
     for i in range(3):
@@ -172,7 +175,8 @@ def _tangent_work(motion, dt, ds, force, o):
 def _advance_bristle(prm, motion, trial, sample, z, slides):
     """Return the plastic dissipation of one piece of path; the law limits the bristle, `z` is renewed.
 
-    The bristle's force during sliding is the trapezoid of both ends where it was sliding before, else the end's.
+    The bristle's force during sliding is the trapezoid of both ends where it was sliding before, else the
+    end's.
     """
     friction(prm, motion, trial, sample)
     plastic0, plastic1 = trial[0] - sample[21], trial[1] - sample[22]
@@ -244,15 +248,15 @@ def project_force(samples, nodes, weights, h, outputs):
 @kernel
 def _same(inputs, state, first, n):
     """Tell whether n inputs from `first` are bit for bit those of the last communication point."""
+    same = True
     for i in range(first, first + n):
-        if inputs[i] != state[LAST + i]:
-            return False
-    return True
+        same = same and inputs[i] == state[LAST + i]
+    return same
 
 
 @kernel
 def start_motion(state, start):
-    """Write the motion at the last communication point, seen at the cable point of now (moved along the tangent)."""
+    """Write the last communication point's motion, its cable point moved along the tangent."""
     for i in range(24):
         start[i] = state[LAST + i]
     for i in range(3):
@@ -262,7 +266,7 @@ def start_motion(state, start):
 
 @kernel
 def slip_displacement(start, end, rotation, slip):
-    """Write how far the cable has slipped on the wheel between two motions, in the mean frame of both: (2,) m."""
+    """Write how far the cable has slipped on the wheel between two motions, in their mean frame: (2,) m."""
     _l0, u0, x0, d0 = foot(start)
     _l1, u1, x1, d1 = foot(end)
     a0, a1 = axle(start), axle(end)
@@ -333,10 +337,11 @@ def _silence(sample):
 
 @kernel
 def refresh(prm, inputs, state, motions, samples, outputs):
-    """Write the outputs at the instant of the inputs; the state stays. Returns the status of the law.
+    """Write the outputs at the instant of the inputs; the state stays. Return the status of the law.
 
-    The bristle is led on from the last communication point to the inputs. Inputs that have not changed since then
-    have not moved: neither does the new cable point count nor the wheel's rotation over the step that is past.
+    The bristle is led on from the last communication point to the inputs. Inputs that have not changed since
+    then have not moved: neither does the new cable point count nor the wheel's rotation over the step that is
+    past.
     """
     start, row, end = motions[0], samples[0], inputs[:24]
     status = walls(prm, end, row)

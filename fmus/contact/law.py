@@ -1,7 +1,7 @@
 """The contact law at one instant: a straight piece of cable in the V-groove of a wheel.
 
-Vectors are inertial. ``motion`` (24,) holds ``p`` 0:3 the cable point at the contact's arc length, ``t`` 3:6 its
-tangent dr/ds, ``dp`` 6:9 and ``dt`` 9:12 their rates, ``w`` 12:15 the wheel centre, ``a`` 15:18 the axle,
+Vectors are inertial. ``motion`` (24,) holds ``p`` 0:3 the cable point at the contact's arc length, ``t`` 3:6
+its tangent dr/ds, ``dp`` 6:9 and ``dt`` 9:12 their rates, ``w`` 12:15 the wheel centre, ``a`` 15:18 the axle,
 ``dw`` 18:21 the wheel's velocity and ``om`` 21:24 its angular velocity. Equations: README.md of this folder.
 """
 
@@ -27,7 +27,7 @@ PARAMETERS = (
     "tangential_stiffness",
     "tangential_damping",
 )
-"""Names of ``prm[0:11]``; behind them stand the sine and cosine of half the groove angle and the apex radius."""
+"""Names of ``prm[0:11]``; behind them stand sine and cosine of half the groove angle and the apex radius."""
 
 OUT_SIZE = 32
 OPEN, STICK, SLIP, LEFT = 0, 1, 2, 3
@@ -37,7 +37,7 @@ _K, _N, _D, _MU, _RADIUS, _ANGLE, _WIDTH, _DIAMETER, _LENGTH, _KT, _CT, _SIN, _C
 
 
 NODES, WEIGHTS = np.polynomial.legendre.leggauss(9)
-"""Gauss-Legendre rule on the piece of cable that a wall touches (relative error 4e-6 at n = 2.5, see README)."""
+"""Gauss-Legendre rule on the piece of cable that a wall touches (relative error 4e-6 at n = 2.5)."""
 
 
 def law_parameters(values: np.ndarray, table: VariableTable) -> np.ndarray:
@@ -82,7 +82,7 @@ def _combine(a, x, b):
 
 @kernel
 def foot(motion):
-    """Return tangent length |t|, unit tangent u, offset (m) of the wheel centre's foot from p, and foot - w."""
+    """Return |t|, the unit tangent u, the offset (m) of the wheel centre's foot from p, and foot - w."""
     t = (motion[3], motion[4], motion[5])
     length = math.sqrt(_dot(t, t))
     u = (t[0] / length, t[1] / length, t[2] / length)
@@ -93,7 +93,7 @@ def foot(motion):
 
 @kernel
 def axle(motion):
-    """Return the axle direction, normalised: along an interpolated path it is a unit vector to second order only."""
+    """Return the axle, normalised: along an interpolated path it is a unit vector to second order only."""
     a = (motion[15], motion[16], motion[17])
     norm = math.sqrt(_dot(a, a))
     return (a[0] / norm, a[1] / norm, a[2] / norm)
@@ -111,7 +111,7 @@ def lateral(u, a):
 
 @kernel
 def _deepest(side, u_a, apart, prm):
-    """Return where along the line, from the foot, a wall is pressed deepest, within the longest contact length.
+    """Return where on the line, from the foot, a wall is pressed deepest within the longest contact length.
 
     The penetration is concave along the line while the angle between cable and wheel plane is below half the
     groove angle; beyond, its end is deepest.
@@ -129,10 +129,10 @@ def _deepest(side, u_a, apart, prm):
 
 @kernel
 def _touched(side, u_a, y, distance_squared, prm):
-    """Return the ends of the touched piece of the line, from the foot, for a wall that is pressed somewhere.
+    """Return the ends, from the foot, of the piece of line that touches a wall which is pressed somewhere.
 
-    delta > 0 means rho(x) < A + B x, a quadratic inequality. Where the cable is steeper than the wall (more than
-    half the groove angle off the wheel plane) the whole longest contact length is returned.
+    delta > 0 means rho(x) < A + B x, a quadratic inequality. Where the cable is steeper than the wall (more
+    than half the groove angle off the wheel plane) the whole longest contact length is returned.
     """
     half = 0.5 * prm[_LENGTH]
     c = prm[_COS] / prm[_SIN]
@@ -159,7 +159,7 @@ def walls(prm, motion, out):
 
     Returns
     -------
-    int, 0 or the cause of failure: 1 the tangent has no length, 2 the axle has none, 3 the motion is not finite
+    int, 0 or the cause of failure: 1 tangent without length, 2 axle without length, 3 motion not finite
     """
     for i in range(OUT_SIZE):
         out[i] = 0.0
@@ -270,10 +270,10 @@ def walls(prm, motion, out):
 
 @kernel
 def friction(prm, motion, slip, out):
-    """Add the friction to what `walls` has written: both parts of the bristle kept inside the Coulomb disc.
+    """Add the friction to what `walls` has written; the bristle is kept inside the Coulomb disc.
 
-    The elongation is projected on the disc |k_t z| <= mu N, then the force k_t z + c_t v on the disc mu N. Both
-    are projections on a convex set, so that neither can give back more energy than was put in.
+    The elongation is projected on the disc |k_t z| <= mu N, then the force k_t z + c_t v on the disc mu N.
+    Both are projections on a convex set, so that neither can give back more energy than was put in.
     """
     kt, ct = prm[_KT], prm[_CT]
     limit = prm[_MU] * out[12]
@@ -319,16 +319,16 @@ def contact_wrench(prm, motion, slip, out):
     prm : (14,) of `law_parameters`
     motion : (24,) see the module's head
     slip : (2,) m, trial elongation of the friction bristle along the cable and along the axle
-    out : (32,) 0:3 force (N) and 3:6 moment about p (N.m) on the cable, 6:9 force and 9:12 moment about w on the
-        wheel, 12 normal force of both walls, 13:15 friction on the cable along cable and axle, 15 deepest
+    out : (32,) 0:3 force (N) and 3:6 moment about p (N.m) on the cable, 6:9 force and 9:12 moment about w on
+        the wheel, 12 normal force of both walls, 13:15 friction on the cable along cable and axle, 15 deepest
         penetration (m; negative: the gap), 16:18 slip velocity of the cable relative to the wheel, 18 contact
-        length, 19 status, 20 offset of the contact from p (m of arc length), 21:23 elongation after the Coulomb
-        limit, 23 and 24 power (W) dissipated by the walls and by friction, 25 and 26 elastic energy (J) of walls
-        and bristle
+        length, 19 status, 20 offset of the contact from p (m of arc length), 21:23 elongation after the
+        Coulomb limit, 23 and 24 power (W) dissipated by the walls and by friction, 25 and 26 elastic energy
+        (J) of walls and bristle
 
     Returns
     -------
-    int, 0 or the cause of failure: 1 the tangent has no length, 2 the axle has none, 3 the motion is not finite
+    int, 0 or the cause of failure: 1 tangent without length, 2 axle without length, 3 motion not finite
     """
     status = walls(prm, motion, out)
     if status == OK:

@@ -456,11 +456,15 @@ def _newton(system, h, space, work):
         for j in range(2):
             increment = 2.0 * (method.from_mode[j] * w).real
             work.a[j, i] += increment
+            if not abs(increment) < np.inf:
+                return np.inf
             change = max(change, scale * abs(increment))
     for i in range(N_ROBOT):
         for j in range(2):
             increment = 2.0 * (method.from_mode[j] * x[i]).real
             space.b[j, i] += increment
+            if not abs(increment) < np.inf:
+                return np.inf
             change = max(change, scale * abs(increment))
     return change
 
