@@ -8,7 +8,7 @@ from inspect import signature
 from pathlib import Path
 from typing import Any
 
-from fmus.variables import Kind, Variable
+from fmus.variables import Kind, Value, Variable
 from orchestrator.errors import InputError
 
 KINDS: dict[str, Kind] = {"Real": "real", "Float64": "real", "Float32": "real", "Boolean": "boolean"}
@@ -57,15 +57,28 @@ def of_fmu(path: Path) -> dict[str, Variable]:
     known: dict[str, Variable] = {}
     for v in description(path).modelVariables:
         parameter = v.causality == "parameter" or (v.causality == "local" and v.variability == "tunable")
+        kind = KINDS.get(v.type, "real")
         known[v.name] = Variable(
             v.name,
             "parameter" if parameter else "input" if v.causality == "input" else "output",
             v.unit or (v.declaredType.unit if v.declaredType else None) or "1",
-            v.start if v.start is not None else "",
+            _start(v.start, kind),
             v.description or "",
-            KINDS.get(v.type, "real"),
+            kind,
         )
     return known
+
+
+def _start(text: str | None, kind: Kind) -> Value:
+    """Return a start value of a model description; an empty string if there is none, or an array's."""
+    if text is None or kind == "string":
+        return text or ""
+    if kind == "boolean":
+        return text in ("true", "1")
+    try:
+        return int(text) if kind == "integer" else float(text)
+    except ValueError:
+        return ""
 
 
 def description(path: Path) -> Any:
