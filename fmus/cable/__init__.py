@@ -1,0 +1,1 @@
+"""The cable: gradient-deficient ANCF Euler–Bernoulli elements, statics and dynamics."""

@@ -1,0 +1,275 @@
+"""The cable as a module: variable table, initialisation, outputs."""
+
+from __future__ import annotations
+
+import numpy as np
+from scipy.optimize import brentq
+
+from fmus.cable import dynamics
+from fmus.cable.assembly import Model, dot, interpolate, internal_force, kinetic_energy
+from fmus.cable.dynamics import N_PORTS
+from fmus.cable.statics import equilibrium, mesh_model
+from fmus.time_integration import collocation, generalized_alpha
+from fmus.variables import ModuleError, Variable, VariableTable, vector
+
+N_SHAPE = 41
+"""Points at which the shape of the cable is shown, equally spaced in unstretched arc length."""
+
+
+def _parameters() -> list[Variable]:
+    def real(name: str, unit: str, start: float, description: str) -> Variable:
+        return Variable(name, "parameter", unit, start, description)
+
+    return [
+        real("span", "m", 200.0, "horizontal distance of the supports"),
+        real("level_difference", "m", 0.0, "height of the right support above the left one"),
+        real("unstretched_length", "m", 200.0, "unstretched length of the cable"),
+        real(
+            "sag",
+            "m",
+            0.0,
+            "sag at midspan wanted; 0: given by unstretched_length, else that is found from the sag",
+        ),
+        Variable("n_elements", "parameter", "1", 20, "number of elements", kind="integer"),
+        real("grading", "1", 1.0, "ratio of the longest to the shortest element; 1: equal elements"),
+        real(
+            "grading_position",
+            "m",
+            -1.0,
+            "arc length of a refined point besides the supports; negative: none",
+        ),
+        real("axial_stiffness", "N", 8.12e7, "EA"),
+        real("bending_stiffness", "N.m2", 6580.0, "EI"),
+        real("linear_density", "kg/m", 0.91, "mass per unstretched length"),
+        real("damping_time", "s", 0.005, "Kelvin-Voigt damping: ratio of viscosity to stiffness"),
+        real("gravity", "m/s2", 9.8, "acceleration of gravity, towards -z"),
+        Variable(
+            "clamped", "parameter", "1", False, "supports hold the transverse slope too", kind="boolean"
+        ),
+        real("integration_step", "s", 0.0025, "longest inner step"),
+        real(
+            "spectral_radius",
+            "1",
+            0.9,
+            "spectral radius of the time integration at infinite frequency, 0 to 1",
+        ),
+        Variable(
+            "integrator",
+            "parameter",
+            "1",
+            "collocation",
+            "time integration: two-stage collocation (order 3, 4 at spectral radius 1) or generalized-alpha (order 2)",
+            kind="string",
+            choices=("collocation", "generalized_alpha"),
+        ),
+    ]
+
+
+def _port(k: int) -> tuple[list[Variable], list[Variable]]:
+    """Return the inputs and the outputs of port k, each in the order that the kernels use."""
+    p = f"port[{k}]"
+    s = Variable(f"{p}.s", "input", "m", 0.0, "unstretched arc length of the contact point", discrete=True)
+    inputs = [s]
+    inputs += vector(f"{p}.force", "input", "N", "force on the cable, mean over the macro step")
+    inputs += vector(f"{p}.moment", "input", "N.m", "moment on the cable about the contact point, mean")
+    inputs += vector(f"{p}.force_rate", "input", "N/s", "slope of the force within the macro step")
+    inputs += vector(f"{p}.moment_rate", "input", "N.m/s", "slope of the moment within the macro step")
+    f = (f"{p}.s",)
+    outputs = vector(f"{p}.position", "output", "m", "contact point on the centreline", feedthrough=f)
+    outputs += vector(f"{p}.tangent", "output", "1", "dr/ds there, not normalised", feedthrough=f)
+    outputs += vector(f"{p}.velocity", "output", "m/s", "velocity of the contact point", feedthrough=f)
+    outputs += vector(f"{p}.tangent_rate", "output", "1/s", "rate of dr/ds", feedthrough=f)
+    outputs += vector(f"{p}.position_mean", "output", "m", "time mean of position over the last macro step")
+    outputs += vector(f"{p}.tangent_mean", "output", "1", "time mean of tangent over the last macro step")
+    outputs.append(Variable(f"{p}.work", "output", "J", 0.0, "work done on the cable through this port"))
+    return inputs, outputs
+
+
+def _table() -> VariableTable:
+    ports = [_port(k + 1) for k in range(N_PORTS)]
+    rows = _parameters()
+    for inputs, _ in ports:
+        rows += inputs
+    for _, outputs in ports:
+        rows += outputs
+    for name, unit, description in (
+        ("tension_left", "N", "tension at the left support"),
+        ("tension_mid", "N", "tension at midspan"),
+        ("tension_right", "N", "tension at the right support"),
+        ("kinetic_energy", "J", "kinetic energy"),
+        ("strain_energy", "J", "elastic energy of stretching and bending"),
+        ("gravitational_energy", "J", "potential energy of gravity, zero at z = 0"),
+        ("dissipated_energy", "J", "energy dissipated by material damping"),
+        ("reaction_left.x", "N", "force of the left support on the cable, x"),
+        ("reaction_left.y", "N", "force of the left support on the cable, y"),
+        ("reaction_left.z", "N", "force of the left support on the cable, z"),
+        ("reaction_right.x", "N", "force of the right support on the cable, x"),
+        ("reaction_right.y", "N", "force of the right support on the cable, y"),
+        ("reaction_right.z", "N", "force of the right support on the cable, z"),
+    ):
+        rows.append(Variable(name, "output", unit, 0.0, description))
+    for i in range(N_SHAPE):
+        rows += vector(
+            f"shape[{i + 1}].position", "output", "m", f"centreline at {i}/{N_SHAPE - 1} of its length"
+        )
+        rows.append(Variable(f"shape[{i + 1}].tension", "output", "N", 0.0, "axial force there"))
+    return VariableTable(rows)
+
+
+class Cable:
+    """The ANCF cable between two supports; see the module's README for equations and sources."""
+
+    NAME = "cable"
+    TITLE = "Sagging cable: gradient-deficient ANCF Euler-Bernoulli elements between two supports"
+    table = _table()
+
+    def __init__(self) -> None:
+        self.values = self.table.defaults()
+        self.state = np.zeros(0)
+
+    def __getitem__(self, name: str) -> float:
+        return float(self.values[self.table.index[name]])
+
+    @property
+    def _ports(self) -> np.ndarray:
+        first = self.table.index["port[1].s"]
+        return self.values[first : first + 13 * N_PORTS].reshape(N_PORTS, 13)
+
+    def initialize(self, t: float) -> None:
+        """Mesh the cable, find its static equilibrium, start the state there; raises `ModuleError`."""
+        self._check()
+        if self["sag"] > 0.0:
+            self.values[self.table.index["unstretched_length"]] = self._length_for_sag()
+        self.model, q = self._rest(self["unstretched_length"])
+        n = q.size
+        self.state = np.zeros(dynamics.state_size(n))
+        self.state[:n] = q
+        self._collocation = collocation(self["spectral_radius"])
+        self._alpha = generalized_alpha(self["spectral_radius"])
+        self._use_alpha = self["integrator"] == 1.0
+        self._work = dynamics.make_work(n, self.state.size)
+        self._means = np.zeros((N_PORTS, 6))
+        self._means_valid = False
+        self._offset = 0.0
+        self.refresh()
+
+    def _rest(self, length: float) -> tuple[Model, np.ndarray]:
+        """Return the cable of the given unstretched length and its equilibrium (n,)."""
+        model = mesh_model(
+            span=self["span"],
+            level_difference=self["level_difference"],
+            unstretched_length=length,
+            n_elements=int(self["n_elements"]),
+            grading=self["grading"],
+            grading_position=self["grading_position"],
+            ea=self["axial_stiffness"],
+            ei=self["bending_stiffness"],
+            damping=self["damping_time"],
+            density=self["linear_density"],
+            gravity=self["gravity"],
+            clamped=bool(self["clamped"]),
+        )
+        return model, equilibrium(model, self["span"], self["level_difference"])
+
+    def _length_for_sag(self) -> float:
+        """Return the unstretched length with which the equilibrium has the sag wanted."""
+
+        def excess(length: float) -> float:
+            model, q = self._rest(length)
+            point = np.zeros(6)
+            interpolate(model, q, length / 2, np.zeros(8), point)
+            return 0.5 * self["level_difference"] - point[2] - self["sag"]
+
+        chord = float(np.hypot(self["span"], self["level_difference"]))
+        longest = chord * (1.0 + 4.0 * (self["sag"] / chord) ** 2) + self["sag"] * 0.01
+        try:
+            return float(brentq(excess, 0.99 * chord, longest, xtol=1e-9 * chord))
+        except ValueError:
+            raise ModuleError(
+                f"cable: sag: {self['sag']:g} m cannot be reached; check it against span, axial_stiffness and linear_density"
+            ) from None
+
+    def _check(self) -> None:
+        positive = ("span", "unstretched_length", "axial_stiffness", "linear_density", "integration_step")
+        for name in (*positive, "bending_stiffness", "damping_time", "sag"):
+            value = self[name]
+            if not np.isfinite(value) or value < 0.0 or (name in positive and value == 0.0):
+                bound = "positive" if name in positive else "zero or positive"
+                raise ModuleError(f"cable: {name} = {value:g} must be {bound} and finite")
+        if not np.all(np.isfinite(self.values[: len(self.table.names("parameter"))])):
+            raise ModuleError("cable: a parameter is not a finite number; set it to one")
+        if not 1 <= self["n_elements"] <= 5000:
+            raise ModuleError(f"cable: n_elements = {self['n_elements']:g} must be between 1 and 5000")
+        if not 0.0 <= self["spectral_radius"] <= 1.0:
+            raise ModuleError(f"cable: spectral_radius = {self['spectral_radius']:g} must be between 0 and 1")
+        if self["grading"] < 1.0:
+            raise ModuleError(f"cable: grading = {self['grading']:g} must be 1 (equal elements) or more")
+
+    def step(self, t: float, h: float) -> None:
+        """Advance from `t` by the macro step `h`; raises `ModuleError` where Newton's method fails."""
+        if not np.all(np.isfinite(self._ports)):
+            raise ModuleError(f"cable: an input at a port is not a finite number at t = {t:g} s")
+        if np.any(self._ports[:, 0] < 0.0) or np.any(self._ports[:, 0] > self.model.s[-1]):
+            k = int(np.argmax((self._ports[:, 0] < 0.0) | (self._ports[:, 0] > self.model.s[-1])))
+            raise ModuleError(
+                f"cable: port[{k + 1}].s = {self._ports[k, 0]:g} m is off the cable (0 to {self.model.s[-1]:g} m)"
+            )
+        status = dynamics.macro_step(
+            self.model,
+            self._collocation,
+            self._alpha,
+            self._use_alpha,
+            self.state,
+            h,
+            self["integration_step"],
+            self._ports,
+            self._means,
+            self._work,
+        )
+        if status != dynamics.OK:
+            raise ModuleError(
+                f"cable: Newton's method does not converge at t = {t:g} s, even with inner steps of "
+                f"{min(h, self['integration_step']) / 2**dynamics.MAX_HALVINGS:.3g} s; check the loads at the ports"
+            )
+        self._means_valid = True
+        self._offset = 0.5 * h
+        self.refresh()
+        self._write_means()
+
+    def _write_means(self) -> None:
+        first = self.table.index["port[1].position.x"]
+        self.values[first : first + 19 * N_PORTS].reshape(N_PORTS, 19)[:, 12:18] = self._means
+
+    def refresh(self) -> None:
+        """Write the outputs at the present state and port arc lengths; means stay those of the last macro step."""
+        n = self.model.weight.size
+        state, work, values, index = self.state, self._work, self.values, self.table.index
+        first = index["port[1].position.x"]
+        ports = values[first : first + 19 * N_PORTS].reshape(N_PORTS, 19)
+        for k in range(N_PORTS):
+            dynamics.port_motion(self.model, state, self._ports[k, 0], work.shape, ports[k, :12])
+        if not self._means_valid:
+            ports[:, 12:18] = ports[:, :6]
+        ports[:, 18] = state[4 * n + 2 :]
+        q, v = state[:n], state[n : 2 * n]
+        strain_energy, _ = internal_force(self.model, q, v, work.residual[0], work.axial, work.element)
+        first = index["tension_left"]
+        values[first + 1] = dynamics.mean_axial_force(
+            self.model, 0.5 * self.model.s[-1], work.axial, work.shape
+        )
+        self._write_shape(work.axial.copy())
+        values[first + 3] = kinetic_energy(self.model, v, work.element, work.residual[0])
+        values[first + 4] = strain_energy
+        values[first + 5] = -dot(self.model.weight, q)
+        values[first + 6] = state[4 * n]
+        reaction = values[first + 7 : first + 13].reshape(2, 3)
+        dynamics.reactions(
+            self.model, self._collocation, self._use_alpha, state, self._ports, self._offset, reaction, work
+        )
+        values[first] = np.linalg.norm(reaction[0])
+        values[first + 2] = np.linalg.norm(reaction[1])
+
+    def _write_shape(self, axial: np.ndarray) -> None:
+        first = self.table.index["shape[1].position.x"]
+        rows = self.values[first : first + 4 * N_SHAPE].reshape(N_SHAPE, 4)
+        dynamics.sample_shape(self.model, self.state, axial, self._work.shape, rows, self._work.point)
