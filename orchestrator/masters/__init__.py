@@ -2,6 +2,7 @@
 
 from orchestrator.masters.base import Master, StepReport
 from orchestrator.masters.gauss_seidel import GaussSeidel
+from orchestrator.masters.interface_jacobian import InterfaceJacobian
 from orchestrator.masters.iqn_ils import IqnIls
 from orchestrator.masters.jacobi import Jacobi
 
@@ -9,6 +10,7 @@ MASTERS: dict[str, type[Master]] = {
     "jacobi": Jacobi,
     "gauss_seidel": GaussSeidel,
     "iqn_ils": IqnIls,
+    "interface_jacobian": InterfaceJacobian,
 }
 
 __all__ = ["MASTERS", "Master", "StepReport"]

@@ -22,7 +22,7 @@ DIVERGED = 1e6  # growth of the residual over its first value that ends an itera
 
 
 class Accelerator:
-    """How the next iterate follows from the present one; works on scaled vectors."""
+    """How the next iterate follows from the present one."""
 
     columns = 0
 
@@ -56,14 +56,13 @@ class Implicit(Master):
     """
 
     IMPLICIT: ClassVar[bool] = True
-    NAME: ClassVar[str] = "implicit"
 
     def __init__(
         self,
         graph: Graph,
         accelerator: Accelerator,
         *,
-        tolerance: float = 1e-8,
+        tolerance: float = 1e-6,
         absolute: float = 1e-3,
         max_iterations: int = 25,
         max_depth: int = 6,
@@ -127,8 +126,7 @@ class Implicit(Master):
         are left at."""
         self.between.begin()
         x, best = self.predictor.predict(t + H / 2, self.x), (np.inf, self.x)
-        scale = self.scale.update(x, H)
-        self.accelerator.begin(H, scale)
+        self._begin(t, H, x, states)
         first = np.inf
         for k in range(self.max_iterations):
             r = self._residual(t, H, x, states if k else None, report)
@@ -144,12 +142,19 @@ class Implicit(Master):
             first = min(first, residual)
             if not residual <= DIVERGED * max(first, self.tolerance):
                 break
-            scale = self.scale.values
-            x = scale * self.accelerator.propose(x / scale, r / scale)
+            x = self._correct(t, H, x, r, states)
         self.accelerator.reject()
         if keep_best:
             self._hold(t, H, best[1], states, report)
         return False, best[0]
+
+    def _begin(self, t: float, H: float, x: np.ndarray, states: list[State]) -> None:
+        """Prepare for the iteration of a step that starts at the unknowns `x`."""
+        self.accelerator.begin(H, self.scale.update(x, H))
+
+    def _correct(self, t: float, H: float, x: np.ndarray, r: np.ndarray, states: list[State]) -> np.ndarray:
+        """Return the next iterate."""
+        return self.accelerator.propose(x, r)
 
     def _hold(self, t: float, H: float, x: np.ndarray, states: list[State], report: StepReport) -> None:
         """Last resort: make the step with the best iterate held (the rates of loads zero)."""
@@ -211,7 +216,8 @@ class Scale:
     def update(self, x: np.ndarray, H: float) -> np.ndarray:
         """Take `x` (n,) into account; return the scale of every unknown, (n,)."""
         np.maximum.at(self.largest, self.vector, np.abs(x))
-        self.values = self.largest[self.vector] + self.absolute
+        self.values[:] = self.largest[self.vector]
+        self.values += self.absolute
         self.values[self.rate] = self.values[self.load] * (2.0 / H)
         return self.values
 

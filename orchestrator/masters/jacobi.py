@@ -25,6 +25,7 @@ class Jacobi(Master):
     extrapolation : degree k, 0, 1 or 2
     """
 
+    NAME: ClassVar[str] = "jacobi"
     TITLE: ClassVar[str] = "explicit, all components at once, inputs extrapolated"
 
     def __init__(self, graph: Graph, *, extrapolation: int = 0):
