@@ -79,12 +79,14 @@ class Recorder:
                 self.parts.append((fmu.group([self.signals[i].partition(".")[2] for i in places]), places))
         missing = [s for s, owner in zip(self.signals, owners, strict=True) if owner not in graph.components]
         if missing:
-            raise ValueError(f"cannot record {missing[0]}: no such component{nearest(missing[0], graph.components)}")
+            raise ValueError(
+                f"cannot record {missing[0]}: no such component{nearest(missing[0], graph.components)}"
+            )
 
     def read(self, row: np.ndarray) -> None:
         """Read all signals into `row` (len(signals),)."""
         for group, places in self.parts:
-            group.get()
+            group.get_finite()
             row[places] = group.values
 
 
@@ -168,8 +170,9 @@ class _Run:
 
     def __call__(self, start: float, stop: float) -> None:
         try:
-            self._initialize(start, stop)
-            self._loop()
+            with np.errstate(over="ignore", invalid="ignore"):  # what diverges is found by its values
+                self._initialize(start, stop)
+                self._loop()
         except FmuError as error:
             if not self.abandoned:
                 self.log.error = error

@@ -1,4 +1,5 @@
-"""Interface-Jacobian Newton: the expensive components as linear maps over the step, the cheap ones as they are."""
+"""Interface-Jacobian Newton: the expensive components as linear maps over the step, the cheap ones as they
+are."""
 
 from __future__ import annotations
 
@@ -18,17 +19,18 @@ SMALLEST = 1e-5  # relative difference of the unknowns below which it says nothi
 class InterfaceJacobian(Implicit):
     """Implicit; a linear model of the first components of the order, the others stepped inside an inner loop.
 
-    The components whose inputs are all torn (the *modelled* ones: for a landing cable and robot) answer to their inputs x
-    over a macro step by y(x), nearly linear with a Jacobian that hardly changes: y(x) ≈ y(x_k) + J (x - x_k). The rest
-    (the contacts: stiff, nonlinear, cheap) are not approximated. Each outer iteration steps the modelled components once
-    and then solves x = S(y(x_k) + J (x - x_k)) for x, rolling back and stepping the rest alone, by a quasi-Newton iteration
-    whose columns are reused. J comes from differences with rollback, once for each length of step, and is corrected after
-    every outer iteration (Broyden's update, which meets the last difference); it is made anew only when convergence slows.
-    FMI directional derivatives are of no use for it: they hold at an instant, not over a step.
+    The components whose inputs are all torn (the *modelled* ones: for a landing cable and robot) answer to
+    their inputs x over a macro step by y(x), nearly linear with a Jacobian that hardly changes: y(x) ≈
+    y(x_k) + J (x - x_k). The rest (the contacts: stiff, nonlinear, cheap) are not approximated. Each outer
+    iteration steps the modelled components once and then solves x = S(y(x_k) + J (x - x_k)) for x, rolling
+    back and stepping the rest alone, by a quasi-Newton iteration whose columns are reused. J comes from
+    differences with rollback, once for each length of step, and is corrected after every outer iteration
+    (Broyden's update, which meets the last difference); it is made anew only when convergence slows. FMI
+    directional derivatives are of no use for it: they hold at an instant, not over a step.
 
-    Order and stability: those of the exchange. When: the default for contact. Cost: about two steps of the modelled
-    components a macro step. Reference: Sicklinger et al., Int. J. Numer. Methods Eng. 98 (2014) 418-444 (IJCSA); Vierendeels
-    et al., Computers & Structures 85 (2007) 970-976 (models of both sides).
+    Order and stability: those of the exchange. When: the default for contact. Cost: about two steps of the
+    modelled components a macro step. Reference: Sicklinger et al., Int. J. Numer. Methods Eng. 98 (2014)
+    418-444 (IJCSA); Vierendeels et al., Computers & Structures 85 (2007) 970-976 (models of both sides).
 
     Parameters
     ----------
@@ -40,7 +42,9 @@ class InterfaceJacobian(Implicit):
     options : those of `Implicit`
     """
 
-    TITLE: ClassVar[str] = "implicit, Newton with a linear model of the expensive components, inner loop over the cheap ones"
+    TITLE: ClassVar[str] = (
+        "implicit, Newton with a linear model of the expensive components, inner loop over the cheap ones"
+    )
     NAME: ClassVar[str] = "interface_jacobian"
 
     def __init__(
@@ -63,7 +67,9 @@ class InterfaceJacobian(Implicit):
         modelled = {model.node.name for model in self.models}
         self.rest = [(i, node) for i, node in enumerate(graph.nodes) if node.name not in modelled]
         if not self.models or not self.rest:
-            raise GraphError(f"master {self.NAME}: the graph has no component to model or none to iterate over; use iqn_ils")
+            raise GraphError(
+                f"master {self.NAME}: the graph has nothing to model or nothing to iterate over; use iqn_ils"
+            )
 
     def start(self, t: float) -> None:
         """Prepare for the first step."""
@@ -109,7 +115,9 @@ class InterfaceJacobian(Implicit):
                 self._differentiate(model, t, H, x, states)
         return self._solve_interface(t, H, x, r, states)
 
-    def _solve_interface(self, t: float, H: float, x: np.ndarray, r: np.ndarray, states: list[State]) -> np.ndarray:
+    def _solve_interface(
+        self, t: float, H: float, x: np.ndarray, r: np.ndarray, states: list[State]
+    ) -> np.ndarray:
         inner, best = self.accelerator, (np.inf, x)
         inner.begin(H, self.scale.values)
         for _ in range(self.inner_iterations):
@@ -160,7 +168,8 @@ class Model:
         self.last: tuple[np.ndarray, np.ndarray] | None = None
 
     def learn(self, H: float, x: np.ndarray, scale: np.ndarray) -> None:
-        """Take over the step just made, at the unknowns `x` (n,): Broyden's update with the difference to the last."""
+        """Take over the step just made, at the unknowns `x` (n,): Broyden's update with the difference to
+        the last."""
         values, outputs = x[self.unknowns].copy(), self.node.outputs.values.copy()
         if self.last is not None:
             dx, dy = values - self.last[0], outputs - self.last[1]

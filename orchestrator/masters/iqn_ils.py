@@ -10,16 +10,17 @@ from orchestrator.masters.least_squares import LeastSquares
 
 
 class IqnIls(Implicit):
-    """Implicit; the inverse interface Jacobian is built by least squares from the iterations, also of earlier steps.
+    """Implicit; the inverse interface Jacobian is built by least squares from the iterations, also of
+    earlier steps.
 
     With the differences of residual and result to the iteration before, V = [Δr …], W = [ΔS …], newest first,
-    x ← S(x) + W c, c = argmin |V c + r|, solved by QR; a column that adds less than `threshold` of its norm to the
-    newer ones is dropped.
+    x ← S(x) + W c, c = argmin |V c + r|, solved by QR; a column that adds less than `threshold` of its norm
+    to the newer ones is dropped.
 
-    Order: that of the exchange (2 with values held at the mean of both ends, 4 with `waveform`). Stability: that of the
-    exchange. When: stiff interfaces between FMUs that can be rolled back, however many unknowns.
-    Reference: Degroote, Bathe & Vierendeels, Computers & Structures 87 (2009) 793-801; filtering: Haelterman et al.,
-    Computers & Structures 171 (2016) 9-17.
+    Order: that of the exchange (2 with values held at the mean of both ends, 4 with `waveform`). Stability:
+    that of the exchange. When: stiff interfaces between FMUs that can be rolled back, however many unknowns.
+    Reference: Degroote, Bathe & Vierendeels, Computers & Structures 87 (2009) 793-801; filtering: Haelterman
+    et al., Computers & Structures 171 (2016) 9-17.
 
     Parameters
     ----------

@@ -12,7 +12,8 @@ from orchestrator.masters.implicit import Accelerator
 
 @kernel
 def solve_filtered(V, b, threshold, Q, R, kept, c):
-    """Solve min |V[:, kept] c - b|; a column that adds less than `threshold` of its norm to those before it is dropped.
+    """Solve min |V[:, kept] c - b|; a column that adds less than `threshold` of its norm to those before it
+    is dropped.
 
     Gram-Schmidt, twice (which is enough to be orthogonal to round-off), then back substitution.
 
@@ -76,54 +77,72 @@ class LeastSquares(Accelerator):
     reuse : steps whose columns are kept
     threshold : relative size of what a column must add
     relaxation : as long as no column is known
+    mixing : beta of Anderson's method; 1: IQN-ILS
+    depth : columns of the present step that are used at most
     """
 
-    def __init__(self, n: int, reuse: int, threshold: float, relaxation: float):
+    def __init__(
+        self,
+        n: int,
+        reuse: int,
+        threshold: float,
+        relaxation: float,
+        *,
+        mixing: float = 1.0,
+        depth: int = 50,
+    ):
         self.reuse, self.threshold, self.relaxation = reuse, threshold, relaxation
+        self.mixing, self.depth = mixing, depth
         self.past: deque[tuple[float, np.ndarray, np.ndarray]] = deque(maxlen=max(reuse, 1))
-        self.Q, self.R = np.zeros((n, n)), np.zeros((n, n))
-        self.kept, self.c = np.zeros(n), np.zeros(n)
         self.n, self.H = n, 0.0
+        self._allocate(2 * depth)
         self.begin(0.0, np.ones(n))
+
+    def _allocate(self, m: int) -> None:
+        self.V, self.W, self.Q = (np.zeros((m, self.n)) for _ in range(3))
+        self.R, self.kept, self.c = np.zeros((m, m)), np.zeros(m, dtype=np.int64), np.zeros(m)
 
     def reset(self) -> None:
         """Forget all columns."""
         self.past.clear()
 
     def begin(self, H: float, scale: np.ndarray) -> None:
-        """Start a step; columns of steps of another length do not hold and rest."""
-        self.H, self.scale = H, scale
-        self.V, self.W = np.empty((0, self.n)), np.empty((0, self.n))
-        self.old = [(V, W) for length, V, W in self.past if length == H]
-        self.last: tuple[np.ndarray, np.ndarray] | None = None
-        self.columns = 0
+        """Start a step: columns of earlier ones, of the same length, come after those of this one."""
+        self.H, self.weights = H, 1.0 / scale
+        self.new, self.last, self.columns = 0, None, 0
+        old = [(V, W) for length, V, W in self.past if length == H]
+        need = self.depth + sum(len(V) for V, _ in old)
+        if need > len(self.V):
+            self._allocate(2 * need)
+        # rows depth - new … depth are those of this step, newest first; the old ones follow
+        self.end = self.depth
+        for V, W in old:
+            rows = slice(self.end, self.end + len(V))
+            self.V[rows], self.W[rows] = V, W
+            self.end += len(V)
 
     def propose(self, x: np.ndarray, r: np.ndarray) -> np.ndarray:
-        """Return the next iterate; x, r (n,) are not scaled."""
-        s = x + r
-        if self.last is not None:
-            self.V = np.vstack((r - self.last[0], self.V))
-            self.W = np.vstack((s - self.last[1], self.W))
-        self.last = (r, s)
-        V = np.vstack((self.V, *(V for V, _ in self.old)))
-        if not len(V):
+        """Return the next iterate from x (n,) and its residual r (n,)."""
+        mixed = x + self.mixing * r
+        if self.last is not None and self.new < self.depth:
+            self.new += 1
+            row = self.depth - self.new
+            self.V[row] = r - self.last[0]
+            self.W[row] = mixed - self.last[1]
+        self.last = (r, mixed)
+        rows = slice(self.depth - self.new, self.end)
+        if rows.start == rows.stop:
             return x + self.relaxation * r
-        W = np.vstack((self.W, *(W for _, W in self.old)))
-        k = self._solve(V / self.scale, -r / self.scale)
-        return s + self.c[:k] @ W[self.kept[:k].astype(np.intp)]
-
-    def _solve(self, V: np.ndarray, b: np.ndarray) -> int:
-        m = len(V)
-        if m > len(self.R):
-            self.Q, self.R = np.zeros((m, self.n)), np.zeros((m, m))
-            self.kept, self.c = np.zeros(m), np.zeros(m)
-        self.columns = solve_filtered(V, b, self.threshold, self.Q, self.R, self.kept, self.c)
-        return self.columns
+        scaled = self.V[rows] * self.weights
+        k = solve_filtered(scaled, -r * self.weights, self.threshold, self.Q, self.R, self.kept, self.c)
+        self.columns = k
+        return mixed + self.c[:k] @ self.W[rows][self.kept[:k]]
 
     def accept(self) -> None:
         """Keep the columns of the step."""
-        if self.reuse and len(self.V):
-            self.past.appendleft((self.H, self.V, self.W))
+        if self.reuse and self.new:
+            rows = slice(self.depth - self.new, self.depth)
+            self.past.appendleft((self.H, self.V[rows].copy(), self.W[rows].copy()))
 
     def reject(self) -> None:
         """Forget everything: what did not converge was misled by it."""
