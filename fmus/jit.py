@@ -28,11 +28,7 @@ def source_hash(package: Path = PACKAGE) -> str:
 
 
 def _cache_folder() -> Path:
-    for base in (
-        PACKAGE / "__pycache__",
-        Path.home() / ".cache" / "line-landing",
-        Path(tempfile.gettempdir()),
-    ):
+    for base in (PACKAGE / "__pycache__", Path.home() / ".cache" / "line-landing", Path(tempfile.gettempdir())):
         folder = base / f"numba-{source_hash()}"
         try:
             folder.mkdir(parents=True, exist_ok=True)

@@ -263,6 +263,12 @@ class Graph:
         for node in self.nodes:
             node.fmu.enter_initialization(start, stop)
         self.refresh(self.initial_stages)
+        for _ in self.nodes:  # a discrete value goes at most through all components
+            before = self.d.copy()
+            self.exchange_discrete()
+            self.refresh(self.initial_stages)
+            if np.array_equal(before, self.d):
+                break
         if self._loop.size:
             self._solve_loops(start)
         self._send_all()

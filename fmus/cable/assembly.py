@@ -47,9 +47,7 @@ class ElementWork(NamedTuple):
 
 def element_work() -> ElementWork:
     """Return a new workspace."""
-    return ElementWork(
-        np.zeros((12, 12)), np.zeros((12, 12)), np.zeros((4, 4)), np.zeros((7, 4)), np.zeros(3)
-    )
+    return ElementWork(np.zeros((12, 12)), np.zeros((12, 12)), np.zeros((4, 4)), np.zeros((7, 4)), np.zeros(3))
 
 
 @kernel

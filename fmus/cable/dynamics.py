@@ -201,9 +201,7 @@ def collocation_step(model, method, state, h, offset, ports, tolerance, fresh, w
     for i in range(n):  # the stage accelerations go on along their line
         slope = (a[1, i] - a[0, i]) / (method.c[1] - method.c[0])
         for j in range(2):
-            work.a[j, i] = (
-                a[0, i] + slope * (1.0 + ratio * method.c[j] - method.c[0]) if ratio > 0.0 else a[1, i]
-            )
+            work.a[j, i] = a[0, i] + slope * (1.0 + ratio * method.c[j] - method.c[0]) if ratio > 0.0 else a[1, i]
     if fresh and _collocation_matrix(model, method, q0, v0, h, work) != OK:
         return NOT_CONVERGED
     previous = np.inf
@@ -213,8 +211,7 @@ def collocation_step(model, method, state, h, offset, ports, tolerance, fresh, w
         for j in range(2):
             for i in range(n):
                 work.q[j, i] = q0[i] + h * (
-                    method.c[j] * v0[i]
-                    + h * (method.aa[j, 0] * work.a[0, i] + method.aa[j, 1] * work.a[1, i])
+                    method.c[j] * v0[i] + h * (method.aa[j, 0] * work.a[0, i] + method.aa[j, 1] * work.a[1, i])
                 )
                 work.v[j, i] = v0[i] + h * (method.a[j, 0] * work.a[0, i] + method.a[j, 1] * work.a[1, i])
             _port_loads(model, work.q[j], ports, offset + method.c[j] * h, work)
@@ -230,18 +227,16 @@ def collocation_step(model, method, state, h, offset, ports, tolerance, fresh, w
             )
             constrain_vector(model, work.residual[j])
         for i in range(n):
-            work.mode[i] = -(
-                method.to_mode[0] * work.residual[0, i] + method.to_mode[1] * work.residual[1, i]
-            )
+            work.mode[i] = -(method.to_mode[0] * work.residual[0, i] + method.to_mode[1] * work.residual[1, i])
         banded.solve(work.band, work.mode)
         change = 0.0
         for i in range(n):
             for j in range(2):
                 increment = 2.0 * (method.from_mode[j] * work.mode[i]).real
                 work.a[j, i] += increment
+                if not abs(increment) < np.inf:
+                    return NOT_CONVERGED
                 change = max(change, scale * abs(increment))
-        if not change < np.inf:
-            return NOT_CONVERGED
         rate = change / previous if iteration > 0 else 1.0
         if _finished(change, rate, tolerance):
             break
@@ -299,9 +294,9 @@ def generalized_alpha_step(model, method, state, h, offset, ports, tolerance, fr
         change = 0.0
         for i in range(n):
             a1[i] += work.increment[i]
+            if not abs(work.increment[i]) < np.inf:
+                return NOT_CONVERGED
             change = max(change, cq * abs(work.increment[i]))
-        if not change < np.inf:
-            return NOT_CONVERGED
         rate = change / previous if iteration > 0 else 1.0
         if _finished(change, rate, tolerance):
             break
@@ -385,9 +380,7 @@ def macro_step(model, collocation, alpha, use_alpha, state, h, longest, ports, m
             point = work.point.reshape(12)
             port_motion(model, state, ports[k, 0], work.shape, point)
             for i in range(6):
-                mean = 0.5 * (work.start[k, i] + point[i]) + step / 12.0 * (
-                    work.start[k, 6 + i] - point[6 + i]
-                )
+                mean = 0.5 * (work.start[k, i] + point[i]) + step / 12.0 * (work.start[k, 6 + i] - point[6 + i])
                 means[k, i] += mean * step / h
             for i in range(12):
                 work.start[k, i] = point[i]

@@ -43,9 +43,7 @@ def _parameters() -> list[Variable]:
         real("linear_density", "kg/m", 0.91, "mass per unstretched length"),
         real("damping_time", "s", 0.005, "Kelvin-Voigt damping: ratio of viscosity to stiffness"),
         real("gravity", "m/s2", 9.8, "acceleration of gravity, towards -z"),
-        Variable(
-            "clamped", "parameter", "1", False, "supports hold the transverse slope too", kind="boolean"
-        ),
+        Variable("clamped", "parameter", "1", False, "supports hold the transverse slope too", kind="boolean"),
         real("integration_step", "s", 0.0025, "longest inner step"),
         real(
             "spectral_radius",
@@ -109,9 +107,7 @@ def _table() -> VariableTable:
     ):
         rows.append(Variable(name, "output", unit, 0.0, description))
     for i in range(N_SHAPE):
-        rows += vector(
-            f"shape[{i + 1}].position", "output", "m", f"centreline at {i}/{N_SHAPE - 1} of its length"
-        )
+        rows += vector(f"shape[{i + 1}].position", "output", "m", f"centreline at {i}/{N_SHAPE - 1} of its length")
         rows.append(Variable(f"shape[{i + 1}].tension", "output", "N", 0.0, "axial force there"))
     return VariableTable(rows)
 
@@ -254,9 +250,7 @@ class Cable:
         q, v = state[:n], state[n : 2 * n]
         strain_energy, _ = internal_force(self.model, q, v, work.residual[0], work.axial, work.element)
         first = index["tension_left"]
-        values[first + 1] = dynamics.mean_axial_force(
-            self.model, 0.5 * self.model.s[-1], work.axial, work.shape
-        )
+        values[first + 1] = dynamics.mean_axial_force(self.model, 0.5 * self.model.s[-1], work.axial, work.shape)
         self._write_shape(work.axial.copy())
         values[first + 3] = kinetic_energy(self.model, v, work.element, work.residual[0])
         values[first + 4] = strain_energy

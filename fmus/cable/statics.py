@@ -106,9 +106,7 @@ def _on_line(model: Model, span: float, level_difference: float) -> np.ndarray:
     return q
 
 
-def equilibrium(
-    model: Model, span: float, level_difference: float, load: np.ndarray | None = None
-) -> np.ndarray:
+def equilibrium(model: Model, span: float, level_difference: float, load: np.ndarray | None = None) -> np.ndarray:
     """Return the coordinates (n,) in static equilibrium under gravity and `load`.
 
     The potential energy is minimised by Newton's method from the catenary: each step is shortened until the energy falls, and

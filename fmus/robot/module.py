@@ -157,8 +157,8 @@ def inertia_tensor(values: np.ndarray, table: VariableTable) -> np.ndarray:
         )
     if largest > (smallest + middle) * (1.0 + ROUND_OFF):
         raise ModuleError(
-            f"inertia: principal moments {smallest:g}, {middle:g}, {largest:g} kg.m2 are those of no body, the "
-            "largest exceeds the sum of the others; check that they are taken about the centre of mass"
+            f"inertia: principal moments {smallest:g}, {middle:g}, {largest:g} kg.m2 are those of no body, "
+            "the largest exceeds the sum of the others; check that they are taken about the centre of mass"
         )
     return tensor
 
@@ -215,9 +215,8 @@ def body_parameters(values: np.ndarray, table: VariableTable) -> np.ndarray:
 def initial_state(values: np.ndarray, table: VariableTable) -> np.ndarray:
     """Return the rigid-body state (21,) that the parameters `initial.*` describe, wheels at rest."""
     state = np.zeros(rigid_body.RIGID)
-    from_euler(
-        *(float(values[table.index[f"initial.{angle}"]]) for angle in ("roll", "pitch", "yaw")), state[3:7]
-    )
+    roll, pitch, yaw = (float(values[table.index[f"initial.{a}"]]) for a in ("roll", "pitch", "yaw"))
+    from_euler(roll, pitch, yaw, state[3:7])
     arm = np.array(rotate(state[3:7], *_vector(values, table, "center_of_mass")))
     w_IB = _vector(values, table, "initial.angular_velocity")
     state[0:3] = _vector(values, table, "initial.position") + arm
@@ -272,7 +271,7 @@ class Robot:
         rigid_body.outputs(self._prm, self.state, self.values[self._outputs])
 
     def step(self, t: float, h: float) -> None:
-        """Advance from `t` to `t + h` with the inputs' means and slopes; `ModuleError` leaves all as it was."""
+        """Advance from `t` to `t + h` with the inputs' means and slopes; a `ModuleError` changes nothing."""
         if not (math.isfinite(h) and h > 0.0):
             raise ModuleError(f"step at {t:g} s: macro step {h:g} s is not positive; choose one above 0")
         n_inner = max(1, math.ceil(h / self._inner_step * (1.0 - ROUND_OFF)))
@@ -292,4 +291,4 @@ class Robot:
                 f"{where}: the body turns by more than 1 rad in an inner step of {h / n_inner:g} s; "
                 "lower integration_step, or look for loads that are too large"
             )
-        return f"{where}: the motion is no longer finite; lower the macro step or look for loads that are too large"
+        return f"{where}: the motion is no longer finite; look for loads that are too large"

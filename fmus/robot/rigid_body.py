@@ -186,7 +186,7 @@ def resultants(prm, state, loads, force, moment, wheel_torque):
 def control_power(prm, state, loads):
     """Return the power (W) of thrust, control torque and wheel drives at an instant."""
     q = state[3:7]
-    vx, vy, vz = rotate_back(q, state[7], state[8], state[9])
+    _, _, vz = rotate_back(q, state[7], state[8], state[9])
     wx, wy, wz = rotate_back(q, state[10], state[11], state[12])
     v_b = vz + wx * prm[B_FROM_G + 1] - wy * prm[B_FROM_G]
     power = loads[0] * v_b + loads[1] * wx + loads[2] * wy + loads[3] * wz
@@ -258,7 +258,11 @@ def rates(prm, inputs, since_middle, y, dy, work):
 
 @kernel
 def runge_kutta(prm, inputs, since_middle, h, work):
-    """Advance the extended state in the workspace by the classical Runge–Kutta method of order 4."""
+    """Advance the extended state in the workspace by the classical Runge–Kutta method of order 4.
+
+    The stages' quaternions are scaled to unit length too: else their lengths, which differ from 1 by O(h²),
+    would make the result depend on how the inertial axes lie.
+    """
     y = work[_Y : _Y + EXTENDED]
     trial = work[_TRIAL : _TRIAL + EXTENDED]
     k1 = work[_K1 : _K1 + EXTENDED]
@@ -268,12 +272,15 @@ def runge_kutta(prm, inputs, since_middle, h, work):
     rates(prm, inputs, since_middle, y, k1, work)
     for i in range(EXTENDED):
         trial[i] = y[i] + 0.5 * h * k1[i]
+    normalize(trial[3:7])
     rates(prm, inputs, since_middle + 0.5 * h, trial, k2, work)
     for i in range(EXTENDED):
         trial[i] = y[i] + 0.5 * h * k2[i]
+    normalize(trial[3:7])
     rates(prm, inputs, since_middle + 0.5 * h, trial, k3, work)
     for i in range(EXTENDED):
         trial[i] = y[i] + h * k3[i]
+    normalize(trial[3:7])
     rates(prm, inputs, since_middle + h, trial, k4, work)
     for i in range(EXTENDED):
         y[i] += h / 6.0 * (k1[i] + 2.0 * (k2[i] + k3[i]) + k4[i])
@@ -304,7 +311,7 @@ def add_to_means(prm, y, weight, rate_weight, memory, motion):
 def book_work(prm, inputs, start, y, step_size, memory, motion):
     """Write each wheel's rotation and add the work of its contact wrench over the macro step.
 
-    W = F·Δx + Ḟ·(H/2 (x0 + x1) - H x̄) is the integral of (F + Ḟ (tau - t - H/2))·v, by parts; the moment's alike.
+    By parts, W = F·Δx + Ḟ·(H/2 (x0 + x1) - H x̄) is the integral of (F + Ḟ (tau - t - H/2))·v; moments alike.
     """
     for k in range(int(prm[N_WHEELS])):
         wheel_motion(prm, y, k, motion)

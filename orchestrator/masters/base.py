@@ -9,6 +9,7 @@ from typing import ClassVar
 
 import numpy as np
 
+from orchestrator.fmu import suffixed
 from orchestrator.graph import Graph, GraphError, Node
 
 
@@ -126,7 +127,18 @@ class Loads:
         for companion in (rate, mean):
             passed[companion >= 0] = True
             passed[companion[companion >= 0]] = True
+        for node in graph.nodes:  # who takes means rebuilds the course of all its inputs from their ends
+            if _takes_means(node):
+                passed[node.first : node.first + len(node.inputs.names)] = True
         self.instant = np.flatnonzero(~passed)
+
+
+def _takes_means(node: Node) -> bool:
+    """Return whether a component has inputs for the time means of others."""
+    ports = node.fmu.ports
+    return any(
+        port.causality == "input" and suffixed(name, "_mean") in ports for name, port in ports.items()
+    )
 
 
 class Between:

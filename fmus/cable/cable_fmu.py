@@ -1,0 +1,5 @@
+"""The FMU of the cable."""
+
+from fmus.recipe import FmuRecipe
+
+RECIPE = FmuRecipe("cable", "fmus.cable.module:Cable", "ANCF cable between two supports")

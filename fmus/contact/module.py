@@ -1,0 +1,242 @@
+"""The contact module: its variable table, its parameters checked, and its steps."""
+
+from __future__ import annotations
+
+import math
+
+import numpy as np
+
+from fmus.contact import exchange
+from fmus.contact.law import NO_AXLE, NO_TANGENT, NOT_FINITE, OPEN, OUT_SIZE, law_parameters
+from fmus.variables import ModuleError, Value, Variable, VariableTable, vector
+
+SAMPLES = 8
+"""Gauss points of a macro step, in time (see README)."""
+
+_POSITIVE = (
+    "stiffness",
+    "exponent",
+    "wheel_radius",
+    "groove_angle",
+    "groove_width",
+    "cable_diameter",
+    "max_contact_length",
+    "tangential_stiffness",
+)
+_NOT_NEGATIVE = ("damping", "friction_coefficient", "tangential_damping")
+
+
+def _parameters() -> list[Variable]:
+    def real(name: str, unit: str, start: Value, description: str) -> Variable:
+        return Variable(name, "parameter", unit, start, description)
+
+    return [
+        real(
+            "stiffness",
+            "N/m^n",
+            1e8,
+            "stiffness k of one groove wall, force = k * penetration^n; n = exponent",
+        ),
+        real("exponent", "1", 2.5, "exponent n of the penetration"),
+        real("damping", "s/m", 1.0, "Hunt-Crossley damping D, factor 1 + D * penetration rate"),
+        real(
+            "friction_coefficient", "1", 0.7, "Coulomb friction coefficient on the sum of both walls' forces"
+        ),
+        real("wheel_radius", "m", 0.075, "radius of the wheel's rim"),
+        real("groove_angle", "rad", 1.7453292519943295, "full opening angle of the groove"),
+        real("groove_width", "m", 0.08, "width of the groove at the rim"),
+        real("cable_diameter", "m", 0.018, "diameter of the cable"),
+        real(
+            "max_contact_length", "m", 0.06, "longest contact length l0; stiffness / l0 acts per unit length"
+        ),
+        real("tangential_stiffness", "N/m", 1e6, "stiffness of the friction bristle before it slides"),
+        real("tangential_damping", "N.s/m", 1e3, "damping of the friction bristle before it slides"),
+        real("initial.s", "m", 0.0, "arc length of the contact point on the unstretched cable at the start"),
+        Variable(
+            "exchange",
+            "parameter",
+            "1",
+            "waveform",
+            "what the step assumes of the motion inside it",
+            kind="string",
+            choices=("point", "waveform", "hermite"),
+        ),
+    ]
+
+
+def _inputs() -> list[Variable]:
+    def rows(name: str, unit: str, text: str, start: tuple[float, float, float] = (0.0, 0.0, 0.0)):
+        return vector(name, "input", unit, text, start)
+
+    along, above, across = (0.0, 1.0, 0.0), (0.0, 0.0, 0.1), (1.0, 0.0, 0.0)
+    return [
+        *rows("cable.position", "m", "cable point at cable.s"),
+        *rows("cable.tangent", "1", "cable tangent dr/ds", along),
+        *rows("cable.velocity", "m/s", "velocity of the cable point"),
+        *rows("cable.tangent_rate", "1/s", "rate of the cable tangent"),
+        *rows("wheel.position", "m", "wheel centre", above),
+        *rows("wheel.axle", "1", "unit vector of the axle", across),
+        *rows("wheel.velocity", "m/s", "velocity of the wheel centre"),
+        *rows("wheel.angular_velocity", "rad/s", "angular velocity of the wheel"),
+        *rows("cable.position_mean", "m", "time mean of the cable point over the macro step"),
+        *rows("cable.tangent_mean", "1", "time mean of the tangent over the macro step", along),
+        *rows("wheel.position_mean", "m", "time mean of the wheel centre over the macro step", above),
+        *rows("wheel.axle_mean", "1", "time mean of the axle over the macro step", across),
+        *rows("wheel.rotation", "rad", "integral of the wheel's angular velocity over the macro step"),
+        *rows("wheel.rotation_mean", "rad", "time mean of that running integral"),
+    ]
+
+
+def _outputs(motion: tuple[str, ...]) -> list[Variable]:
+    def wrench(body: str, about: str) -> list[Variable]:
+        return [
+            *vector(f"{body}.force", "output", "N", f"mean force on the {body}", feedthrough=motion),
+            *vector(
+                f"{body}.moment",
+                "output",
+                "N.m",
+                f"mean moment on the {body} about {about}",
+                feedthrough=motion,
+            ),
+            *vector(f"{body}.force_rate", "output", "N/s", f"slope of the force on the {body}"),
+            *vector(f"{body}.moment_rate", "output", "N.m/s", f"slope of the moment on the {body}"),
+        ]
+
+    def real(name: str, unit: str, description: str, feedthrough: tuple[str, ...] = motion) -> Variable:
+        return Variable(name, "output", unit, 0.0, description, feedthrough=feedthrough)
+
+    return [
+        *wrench("cable", "cable.position"),
+        *wrench("wheel", "wheel.position"),
+        Variable("cable.s", "output", "m", 0.0, "arc length of the contact point", discrete=True),
+        real("normal_force", "N", "sum of the forces of both groove walls"),
+        real("friction_force", "N", "magnitude of the friction force"),
+        real("penetration", "m", "deepest penetration; negative: the gap"),
+        real("slip_velocity", "m/s", "speed of the cable point relative to the wheel"),
+        real("contact_length", "m", "length of the cable that touches the groove"),
+        Variable(
+            "status",
+            "output",
+            "1",
+            OPEN,
+            "0 open, 1 stick, 2 slip, 3 left the groove",
+            kind="integer",
+            feedthrough=motion,
+        ),
+        real("dissipated_energy", "J", "energy dissipated by walls and friction", ()),
+        real("strain_energy", "J", "elastic energy of walls and friction bristle"),
+        real("work_cable", "J", "work done on the cable, booked from what is exchanged", ()),
+        real("work_wheel", "J", "work done on the wheel, booked from what is exchanged", ()),
+    ]
+
+
+def _table() -> VariableTable:
+    inputs = _inputs()
+    names = tuple(v.name for v in inputs)
+    motion = names[:24] + names[36:39]
+    return VariableTable([*_parameters(), *inputs, *_outputs(motion)])
+
+
+class Contact:
+    """Contact of one grooved wheel with the cable; the equations stand in README.md of this folder."""
+
+    NAME = "contact"
+    TITLE = "Hunt-Crossley contact of a grooved wheel with a cable"
+    table = _table()
+    _INPUTS = slice(table.index["cable.position.x"], table.index["wheel.rotation_mean.z"] + 1)
+    _OUTPUTS = slice(table.index["cable.force.x"], table.index["work_wheel"] + 1)
+
+    def __init__(self) -> None:
+        self.values = self.table.defaults()
+        self.state = np.zeros(exchange.STATE_SIZE)
+
+    def initialize(self, t: float) -> None:
+        """Take over parameters and inputs; the bristle is relaxed, the outputs are the law's now."""
+        self._check_parameters()
+        self._prm = law_parameters(self.values, self.table)
+        self._method = int(self._value("exchange"))
+        self._nodes, self._weights, self._increments = exchange.gauss_rule(SAMPLES)
+        self._path = np.zeros((4, 15))
+        self._motions = np.zeros((SAMPLES + 2, 24))
+        self._samples = np.zeros((SAMPLES + 1, OUT_SIZE))
+        self.state = np.zeros(exchange.STATE_SIZE)
+        self.state[exchange.LAST : exchange.LAST + 24] = self.values[self._INPUTS][:24]
+        self.state[exchange.ARC] = self._value("initial.s")
+        self.refresh()
+        outputs = self.values[self._OUTPUTS]
+        self.state[exchange.STORED] = outputs[exchange.O_STRAIN]
+
+    def refresh(self) -> None:
+        """Write the outputs at the instant of the inputs, with the state as it is."""
+        status = exchange.refresh(
+            self._prm,
+            self.values[self._INPUTS],
+            self.state,
+            self._motions,
+            self._samples,
+            self.values[self._OUTPUTS],
+        )
+        self._raise(status)
+
+    def step(self, t: float, h: float) -> None:
+        """Advance from t to t + h; the inputs hold the motion at t + h and the means over the step."""
+        if not h > 0.0:
+            raise ModuleError(
+                f"contact at t = {t:g} s: macro step {h:g} s must be positive; choose one above zero"
+            )
+        status = exchange.step(
+            self._prm,
+            self._method,
+            self.values[self._INPUTS],
+            h,
+            self._nodes,
+            self._weights,
+            self._increments,
+            self.state,
+            self._path,
+            self._motions,
+            self._samples,
+            self.values[self._OUTPUTS],
+        )
+        self._raise(status, f" at t = {t + h:g} s")
+
+    def _value(self, name: str) -> float:
+        return float(self.values[self.table.index[name]])
+
+    def _check_parameters(self) -> None:
+        for name in (*_POSITIVE, *_NOT_NEGATIVE, "initial.s"):
+            value = self._value(name)
+            if not math.isfinite(value):
+                raise ModuleError(f"contact: {name} = {value:g} is not a finite number; set it to one")
+            if name in _POSITIVE and value <= 0.0:
+                raise ModuleError(f"contact: {name} = {value:g} must be positive; set it above zero")
+            if name in _NOT_NEGATIVE and value < 0.0:
+                raise ModuleError(f"contact: {name} = {value:g} must not be negative; set it to zero or more")
+        self._check_groove()
+
+    def _check_groove(self) -> None:
+        exponent, angle = self._value("exponent"), self._value("groove_angle")
+        if exponent < 1.0:
+            raise ModuleError(
+                f"contact: exponent = {exponent:g} makes the wall infinitely stiff at touch; use >= 1"
+            )
+        if angle >= math.pi:
+            raise ModuleError(
+                f"contact: groove_angle = {angle:g} rad must be below pi; is it given in degrees?"
+            )
+        depth = 0.5 * self._value("groove_width") / math.tan(0.5 * angle)
+        if depth >= self._value("wheel_radius"):
+            raise ModuleError(
+                f"contact: wheel_radius = {self._value('wheel_radius'):g} m is not more than the"
+                f" groove's depth, {depth:g} m; enlarge it, or take a narrower groove or a wider angle"
+            )
+
+    def _raise(self, status: int, when: str = "") -> None:
+        if status == NO_TANGENT:
+            raise ModuleError(f"contact{when}: cable.tangent has no length; connect it to the cable's port")
+        if status == NO_AXLE:
+            raise ModuleError(f"contact{when}: wheel.axle has no length; connect it to the robot's wheel")
+        if status == NOT_FINITE:
+            raise ModuleError(
+                f"contact{when}: the motion of cable or wheel is not finite; take a smaller macro step"
+            )

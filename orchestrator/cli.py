@@ -1,0 +1,349 @@
+"""The command line. Progress and errors go to stderr, answers to stdout.
+
+Exit status: 0 done and within tolerance; 1 done, but a tolerance or a safety limit is missed; 2 wrong input;
+3 the run failed; 130 interrupted. What is heavy is imported where it is used, so that ``--help`` is quick.
+"""
+
+from __future__ import annotations
+
+import sys
+from collections.abc import Callable, Iterator
+from contextlib import contextmanager
+from pathlib import Path
+from typing import TYPE_CHECKING, Annotated, Any
+
+import typer
+from typer.core import TyperGroup
+
+from orchestrator.errors import DONE, FAILED, INTERRUPTED, MISSED, InputError, OrchestratorError
+
+if TYPE_CHECKING:
+    from orchestrator.compare import Comparison
+    from orchestrator.experiment import Coupled
+    from orchestrator.scenario import Scenario
+
+
+class Commands(TyperGroup):
+    """The commands; what they raise for the user ends in a message and an exit status, not in a traceback."""
+
+    def invoke(self, ctx: Any) -> Any:
+        """Carry out one command."""
+        try:
+            return super().invoke(ctx)
+        except OrchestratorError as error:
+            for line in str(error).splitlines():
+                _complain(line)
+            raise typer.Exit(error.exit_status) from None
+        except KeyboardInterrupt:
+            _complain("interrupted")
+            raise typer.Exit(INTERRUPTED) from None
+
+
+app = typer.Typer(
+    cls=Commands,
+    add_completion=False,
+    no_args_is_help=True,
+    pretty_exceptions_enable=False,
+    help="Land power-line robots on a flexible cable: FMUs coupled, and held against a monolithic solver.",
+    epilog="Exit status: 0 done and within tolerance; 1 a tolerance or safety limit is missed; "
+    "2 wrong input; 3 the run failed; 130 interrupted.",
+)
+
+ScenarioFile = Annotated[Path, typer.Argument(metavar="SCENARIO", help="Scenario file (TOML).")]
+Out = Annotated[
+    Path | None, typer.Option(help="Directory of the results; it must not exist. Default: runs/SCENARIO-NNN.")
+]
+Robot = Annotated[str | None, typer.Option(metavar="NAME|FILE.fmu", help="Another robot in the scenario's place.")]
+MasterName = Annotated[str | None, typer.Option(help="Another master, see `orchestrator list`.")]
+MacroStep = Annotated[float | None, typer.Option(help="Another macro step, s.")]
+Stop = Annotated[float | None, typer.Option(help="Another stop time, s.")]
+Set = Annotated[
+    list[str] | None,
+    typer.Option("--set", metavar="KEY=VALUE", help="Another value, e.g. robot.parameters.mass=12; repeatable."),
+]
+Quiet = Annotated[bool, typer.Option("--quiet", help="No progress.")]
+
+
+@app.command()
+def build(out: Annotated[Path, typer.Option(help="Folder of the FMUs.")] = Path("fmu")) -> None:
+    """Build the FMUs of cable, contact and every robot of the catalogue."""
+    from orchestrator.library import build_all
+
+    for path in build_all(out):
+        print(path)
+
+
+@app.command("list")
+def list_() -> None:
+    """List scenarios, robots and masters, with a line each."""
+    from rich.table import Table
+
+    from orchestrator import catalogue
+
+    groups = {
+        "Scenarios": catalogue.scenarios(Path("scenarios")),
+        "Robots": catalogue.robots(),
+        "Masters": catalogue.masters(),
+    }
+    table = Table(box=None, show_header=False, pad_edge=False)
+    for title, lines in groups.items():
+        table.add_row(f"[bold]{title}[/bold]")
+        for name, line in lines.items():
+            table.add_row(f"  {name}", line)
+    _print(table)
+
+
+@app.command()
+def validate(scenario: ScenarioFile, robot: Robot = None, set_: Set = None) -> None:
+    """Parse, load, check connections, units and contract; nothing is run."""
+    loaded = _load(scenario, robot, set_)
+    from orchestrator.experiment import opened
+
+    with opened(loaded) as graph:
+        print(f"{scenario}: valid; {len(graph.components)} FMUs, {len(list(graph.connections))} connections")
+
+
+@app.command()
+def check(
+    fmu: Annotated[Path, typer.Argument(metavar="FILE.fmu", help="The FMU.")],
+    contract: Annotated[
+        str | None, typer.Option(help="robot, cable or contact. Default: the one it suits best.")
+    ] = None,
+) -> None:
+    """Check point by point whether an FMU meets the contract of a robot, a cable or a contact."""
+    from rich.table import Table
+
+    from orchestrator.contract import check_fmu, is_met
+
+    kind, findings = check_fmu(fmu, contract)
+    colours = {"ok": "green", "missing": "red", "wrong": "red", "advice": "yellow"}
+    table = Table(f"{kind} contract", "", "", box=None, pad_edge=False, header_style="bold")
+    for finding in findings:
+        table.add_row(finding.what, f"[{colours[finding.verdict]}]{finding.verdict}[/]", _markup(finding.note))
+    _print(table)
+    met = is_met(findings)
+    print(f"{fmu}: {'meets' if met else 'does not meet'} the {kind} contract")
+    raise typer.Exit(DONE if met else MISSED)
+
+
+@app.command()
+def run(
+    scenario: ScenarioFile,
+    out: Out = None,
+    robot: Robot = None,
+    master: MasterName = None,
+    macro_step: MacroStep = None,
+    stop: Stop = None,
+    set_: Set = None,
+    quiet: Quiet = False,
+) -> None:
+    """Run a scenario coupled."""
+    from orchestrator import experiment
+    from orchestrator.results import RunDirectory
+
+    loaded = _load(scenario, robot, set_, master, macro_step, stop)
+    path = _free(out, loaded.name)
+    with _progress(quiet) as show:
+        coupled = experiment.run(loaded, show(_task(loaded), loaded.simulation.stop_time))
+    experiment.write(RunDirectory(path), coupled)
+    _print_run(coupled)
+    print(f"results in {path}")
+    raise typer.Exit(_status([coupled], within=not coupled.fallen))
+
+
+@app.command()
+def compare(
+    scenario: ScenarioFile,
+    out: Out = None,
+    robot: Robot = None,
+    master: MasterName = None,
+    macro_step: MacroStep = None,
+    stop: Stop = None,
+    set_: Set = None,
+    masters: Annotated[str | None, typer.Option(metavar="A,B,…", help="Masters to compare.")] = None,
+    macro_steps: Annotated[str | None, typer.Option(metavar="H,H,…", help="Macro steps to compare, s.")] = None,
+    quiet: Quiet = False,
+) -> None:
+    """Run a scenario coupled and with the monolithic solver, and say how large the coupling error is."""
+    from orchestrator import experiment
+    from orchestrator.results import RunDirectory
+
+    first = _load(scenario, robot, set_, master, macro_step, stop)
+    variants = _variants(first, masters, macro_steps, lambda m, h: _load(scenario, robot, set_, m, h, stop))
+    path = _free(out, f"{first.name}-compare")
+    steps = sorted({v.simulation.macro_step for v in variants})
+    with _progress(quiet) as show:
+        runs = [experiment.run(v, show(_task(v), v.simulation.stop_time)) for v in variants]
+        reference = experiment.reference(first, steps, show("reference", first.simulation.stop_time))
+    comparison = experiment.compared(runs, reference)
+    experiment.write_comparison(RunDirectory(path), comparison, runs)
+    _print_comparison(comparison)
+    print(f"verdict: {'pass' if comparison.passed else 'FAIL'}; results in {path}, pictures in {path / 'plots'}")
+    raise typer.Exit(_status(runs, comparison.passed and not any(coupled.fallen for coupled in runs)))
+
+
+@app.command()
+def report(
+    directory: Annotated[Path, typer.Argument(metavar="DIR", help="Directory of a finished run.")],
+) -> None:
+    """Draw the pictures of a finished run or comparison anew, and a page that shows them."""
+    from orchestrator.report import report as make
+
+    print(make(directory))
+
+
+def _load(
+    path: Path,
+    robot: str | None,
+    overrides: list[str] | None,
+    master: str | None = None,
+    macro_step: float | None = None,
+    stop: float | None = None,
+) -> Scenario:
+    """Return the scenario with the options of the command line in place of its own values."""
+    from orchestrator.scenario import load
+
+    options = {"macro_step": macro_step, "stop_time": stop}
+    settings = [f"simulation.{key}={float(value)!r}" for key, value in options.items() if value is not None]
+    return load(path, [*settings, *(overrides or [])], robot, master)
+
+
+def _variants(
+    first: Scenario,
+    masters: str | None,
+    macro_steps: str | None,
+    load: Callable[[str | None, float | None], Scenario],
+) -> list[Scenario]:
+    """Return the scenario for every pair of master and macro step that is asked for."""
+    names = _items(masters) or [first.simulation.master]
+    try:
+        steps = [float(text) for text in _items(macro_steps)] or [first.simulation.macro_step]
+    except ValueError:
+        raise InputError(f"--macro-steps {macro_steps}: write numbers with commas between, 0.01,0.005") from None
+    return [load(name, step) for name in dict.fromkeys(names) for step in dict.fromkeys(steps)]
+
+
+def _items(text: str | None) -> list[str]:
+    return [item.strip() for item in (text or "").split(",") if item.strip()]
+
+
+def _free(out: Path | None, name: str) -> Path:
+    """Return the directory to be made; `InputError`, before anything is run, if it exists."""
+    from orchestrator.results import default_directory
+
+    path = out or default_directory(name)
+    if path.exists():
+        raise InputError(f"{path}: exists already; remove it or choose another with --out")
+    return path
+
+
+def _task(scenario: Scenario) -> str:
+    from orchestrator.report import run_label
+
+    return run_label(scenario.simulation.master, scenario.simulation.macro_step)
+
+
+def _status(runs: list[Coupled], within: bool) -> int:
+    """Return the exit status, and say on stderr what failed."""
+    from orchestrator.experiment import Interruption
+
+    status = DONE if within else MISSED
+    for coupled in runs:
+        for contact in coupled.fallen:
+            _complain(f"{contact}: the cable left the groove; the robot has fallen off")
+        if coupled.log.error is not None:
+            _complain(f"{coupled.label}: {coupled.log.error}; the results up to there are kept")
+            status = INTERRUPTED if isinstance(coupled.log.error, Interruption) else FAILED
+    return status
+
+
+def _print_run(coupled: Coupled) -> None:
+    from rich.table import Table
+
+    from orchestrator.plots import panels_for
+
+    log, table = coupled.log, Table("signal", "unit", "start", "min", "max", "end", box=None, pad_edge=False)
+    for panel in panels_for(coupled.table):
+        values = coupled.table[panel.signal] * panel.factor
+        numbers = (values[0], values.min(), values.max(), values[-1])
+        table.add_row(panel.signal, panel.unit, *(f"{number:.5g}" for number in numbers))
+    _print(table)
+    print(
+        f"{coupled.master}, macro step {log.macro_step:g} s: {len(log.steps)} steps, "
+        f"{log.iterations_per_step:.2f} iterations a step, {log.unconverged} unconverged, {log.wall:.2f} s"
+    )
+
+
+def _print_comparison(comparison: Comparison) -> None:
+    from rich.table import Table
+
+    from orchestrator.report import verdict_word
+
+    reference = comparison.reference
+    print(f"reference: {reference.kind}, {reference.wall_s:.2f} s")
+    costs = Table("master", "H \\[s]", "iterations", "unconverged", "cable steps", "wall \\[s]", box=None, pad_edge=False)
+    for r in comparison.runs:
+        numbers = (
+            f"{r.iterations_per_step:.2f}",
+            f"{r.unconverged_steps}",
+            f"{r.cable_steps}",
+            f"{r.wall_s:.2f}",
+        )
+        costs.add_row(r.master, f"{r.macro_step:g}", *numbers)
+    _print(costs)
+    checks = Table("master", "H \\[s]", "signal", "relative error", "allowed", "verdict", box=None, pad_edge=False)
+    for c in comparison.checks:
+        word = _markup(verdict_word(c.passed, c.note))
+        shown = f"[green]{word}[/]" if c.passed else f"[red]{word}[/]"
+        checks.add_row(c.master, f"{c.macro_step:g}", c.signal, f"{c.error:.2e}", f"{c.tolerance:g}", shown)
+    _print(checks)
+    for master, orders in comparison.observed_order.items():
+        shown = ", ".join(f"{name} {orders[name]:.2f}" for name in comparison.tolerance if name in orders)
+        print(f"observed order, {master}: {shown}")
+
+
+def _print(table: object) -> None:
+    """Print a rich table on stdout; a pipe gets every column whole."""
+    from rich.console import Console
+
+    Console(width=None if sys.stdout.isatty() else 200, highlight=False).print(table)
+
+
+def _markup(text: str) -> str:
+    from rich.markup import escape
+
+    return escape(text)
+
+
+@contextmanager
+def _progress(quiet: bool) -> Iterator[Callable[[str, float], Callable[[float], None]]]:
+    """Give a function that starts a bar, and returns what tells the bar how far the run is."""
+    from rich.console import Console
+    from rich.progress import BarColumn, Progress, TextColumn, TimeElapsedColumn, TimeRemainingColumn
+
+    columns = (
+        TextColumn("{task.description}"),
+        BarColumn(),
+        TextColumn("{task.completed:.2f} of {task.total:g} s"),
+    )
+    console = Console(stderr=True, quiet=quiet)
+    with Progress(*columns, TimeElapsedColumn(), TimeRemainingColumn(), console=console, disable=quiet) as bars:
+
+        def start(description: str, total: float) -> Callable[[float], None]:
+            task = bars.add_task(description, total=total)
+            return lambda time: bars.update(task, completed=time)
+
+        yield start
+
+
+def _complain(message: str) -> None:
+    print(f"orchestrator: {message}", file=sys.stderr)
+
+
+def main(arguments: list[str] | None = None) -> None:
+    """Run the command line and end the process with its exit status."""
+    app(arguments)
+
+
+if __name__ == "__main__":
+    main()

@@ -1,0 +1,208 @@
+"""How wrong the coupled runs are: errors against a reference, observed orders, verdict."""
+
+from __future__ import annotations
+
+from collections.abc import Iterable, Mapping
+from dataclasses import dataclass, field
+from typing import Any
+
+import numpy as np
+
+from orchestrator.results import Table
+
+REFERENCE_MARGIN = 0.1
+"""The reference's own error may be this part of a tolerance, or the verdict means nothing."""
+
+
+@dataclass(frozen=True)
+class SignalError:
+    """Error of one signal at the communication points, over the whole run.
+
+    Attributes
+    ----------
+    max_error, rms_error : in the signal's unit
+    scale : the reference's peak-to-peak, in the signal's unit
+    relative_max_error : `max_error` / `scale`
+    """
+
+    max_error: float
+    rms_error: float
+    scale: float
+    relative_max_error: float
+
+
+@dataclass
+class Reference:
+    """The solution that is held against the runs.
+
+    Attributes
+    ----------
+    kind : how it was made, in words
+    table : its signals at all communication points of all runs
+    wall_s : s
+    estimated_error : its own error by signal, in the signal's unit
+    fields : arrays over time, as in ``fields.h5``
+    """
+
+    kind: str
+    table: Table
+    wall_s: float
+    estimated_error: dict[str, float]
+    fields: dict[str, np.ndarray] = field(default_factory=dict)
+
+
+@dataclass
+class Run:
+    """One coupled run, held against the reference."""
+
+    master: str
+    macro_step: float
+    steps: int
+    iterations_per_step: float
+    unconverged_steps: int
+    cable_steps: int
+    wall_s: float
+    signals: dict[str, SignalError]
+
+
+@dataclass(frozen=True)
+class Check:
+    """One line of the verdict: a signal of a run against its tolerance."""
+
+    master: str
+    macro_step: float
+    signal: str
+    error: float
+    tolerance: float
+    passed: bool
+    note: str = ""
+
+
+@dataclass
+class Comparison:
+    """All runs against one reference; `tolerance` is the largest `relative_max_error` by signal."""
+
+    reference: Reference
+    runs: list[Run]
+    tolerance: dict[str, float]
+
+    @property
+    def checks(self) -> list[Check]:
+        """Every tolerance held against every run."""
+        return [
+            _check(run, signal, tolerance, self.reference.estimated_error.get(signal))
+            for run in self.runs
+            for signal, tolerance in self.tolerance.items()
+        ]
+
+    @property
+    def passed(self) -> bool:
+        """Whether every run meets every tolerance."""
+        return all(check.passed for check in self.checks)
+
+    @property
+    def observed_order(self) -> dict[str, dict[str, float]]:
+        """Slope of the largest error over the macro step, by master and signal; two macro steps at least."""
+        return {
+            master: orders
+            for master in dict.fromkeys(run.master for run in self.runs)
+            if (orders := _orders([run for run in self.runs if run.master == master]))
+        }
+
+    def content(self) -> dict[str, Any]:
+        """Return what ``comparison.json`` holds."""
+        reference = self.reference
+        return {
+            "reference": {
+                "kind": reference.kind,
+                "wall_s": reference.wall_s,
+                "estimated_error": reference.estimated_error,
+            },
+            "runs": self.runs,
+            "observed_order": self.observed_order,
+            "tolerance": self.tolerance,
+            "verdict": "pass" if self.passed else "fail",
+        }
+
+    @classmethod
+    def from_content(cls, content: Mapping[str, Any], table: Table) -> Comparison:
+        """Return the comparison that ``comparison.json`` and ``reference.csv`` hold."""
+        reference = Reference(table=table, **content["reference"])
+        runs = [
+            Run(**{**run, "signals": {n: SignalError(**_numbers(e)) for n, e in run["signals"].items()}})
+            for run in content["runs"]
+        ]
+        return cls(reference, runs, content["tolerance"])
+
+
+def _numbers(values: Mapping[str, float | None]) -> dict[str, float]:
+    """Return `values` with the infinity back that JSON has as null."""
+    return {name: float("inf") if value is None else value for name, value in values.items()}
+
+
+def signal_errors(table: Table, reference: Table) -> dict[str, SignalError]:
+    """Return the errors of all signals that `table` and `reference` both have.
+
+    Every time of `table` must be among the reference's.
+    """
+    rows = matching_rows(reference["time"], table["time"])
+    common = [name for name in table if name in reference and name != "time"]
+    return {name: _signal_error(table[name], reference[name], rows) for name in common}
+
+
+def matching_rows(times: np.ndarray, wanted: np.ndarray) -> np.ndarray:
+    """Return the places of `wanted` among the rising `times`, up to rounding; all must be there."""
+    rows = np.clip(np.searchsorted(times, wanted), 1, max(1, len(times) - 1))
+    rows -= np.abs(times[rows - 1] - wanted) <= np.abs(times[rows % len(times)] - wanted)
+    gap = np.abs(times[rows] - wanted)
+    if np.any(gap > 1e-9 * (1.0 + np.abs(wanted))):
+        raise ValueError(f"the reference has no value at t = {wanted[np.argmax(gap)]:g} s")
+    return rows
+
+
+def communication_times(stop_time: float, macro_steps: Iterable[float]) -> np.ndarray:
+    """Return the communication points of all macro steps together, each once: (n,) s."""
+    grids = [np.arange(round(stop_time / step) + 1) * step for step in macro_steps]
+    times = np.sort(np.concatenate(grids))
+    return times[np.append(True, np.diff(times) > 1e-9 * (1.0 + stop_time))]
+
+
+def observed_order(macro_steps: Iterable[float], errors: Iterable[float]) -> float:
+    """Return the slope of log(error) over log(macro step) by least squares; NaN where an error is zero."""
+    steps, values = np.array(list(macro_steps)), np.array(list(errors))
+    if len(np.unique(steps)) < 2 or not np.all(np.isfinite(values)) or np.any(values <= 0.0):
+        return float("nan")
+    return float(np.polyfit(np.log(steps), np.log(values), 1)[0])
+
+
+def _signal_error(values: np.ndarray, reference: np.ndarray, rows: np.ndarray) -> SignalError:
+    difference = np.abs(values - reference[rows])
+    largest, scale = float(np.max(difference)), float(np.ptp(reference))
+    relative = largest / scale if scale > 0.0 else (0.0 if largest == 0.0 else float("inf"))
+    return SignalError(largest, float(np.sqrt(np.mean(difference**2))), scale, relative)
+
+
+def _check(run: Run, signal: str, tolerance: float, estimate: float | None) -> Check:
+    error = run.signals.get(signal)
+    if error is None:
+        note = "not among the signals of run and reference"
+        return Check(run.master, run.macro_step, signal, float("nan"), tolerance, False, note)
+    value, note = error.relative_max_error, ""
+    if estimate is None:
+        note = "the reference does not say how accurate it is"
+    elif not estimate <= REFERENCE_MARGIN * tolerance * error.scale:
+        note = f"reference not accurate enough: its own error is {estimate / max(error.scale, 1e-300):.1e}"
+    return Check(run.master, run.macro_step, signal, value, tolerance, value <= tolerance and not note, note)
+
+
+def _orders(runs: list[Run]) -> dict[str, float]:
+    steps = [run.macro_step for run in runs]
+    if len(set(steps)) < 2:
+        return {}
+    common = [name for name in runs[0].signals if all(name in run.signals for run in runs)]
+    return {name: observed_order(steps, [run.signals[name].max_error for run in runs]) for name in common}
+
+
+def largest_difference(table: Table, other: Table) -> Mapping[str, float]:
+    """Return the largest difference by signal between two tables at the times of `table`."""
+    return {name: error.max_error for name, error in signal_errors(table, other).items()}

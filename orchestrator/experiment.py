@@ -1,0 +1,383 @@
+"""A scenario carried out: the coupled run, the reference, their comparison, and the files of each."""
+
+from __future__ import annotations
+
+import re
+import signal
+from collections.abc import Callable, Iterable, Iterator, Mapping
+from contextlib import contextmanager
+from dataclasses import dataclass
+from fractions import Fraction
+from functools import reduce
+from math import gcd
+from pathlib import Path
+from typing import Any
+
+import numpy as np
+
+from fmus.variables import ModuleError
+from orchestrator import landing, monolithic, vocabulary
+from orchestrator.compare import (
+    Comparison,
+    Reference,
+    Run,
+    communication_times,
+    largest_difference,
+    signal_errors,
+)
+from orchestrator.contract import BREAKS, check_variables
+from orchestrator.errors import InputError, RunError
+from orchestrator.fmu import Fmu, FmuError
+from orchestrator.graph import Connection, Graph
+from orchestrator.masters import MASTERS, StepReport
+from orchestrator.report import Record, draw_comparison, draw_run, run_label
+from orchestrator.results import RunDirectory, Table
+from orchestrator.scenario import Scenario
+from orchestrator.simulation import Log, simulate
+
+LEFT_THE_GROOVE = 3
+"""Value of a contact's `status` when the cable has left the groove."""
+FIELD_UNITS = {"time": "s", "arc_length": "m", "position": "m", "tension": "N"}
+
+Progress = Callable[[float], None]
+"""Told the time (s) that a run has come to."""
+
+
+@dataclass
+class Coupled:
+    """A finished coupled run: the log, and what it was made from.
+
+    Attributes
+    ----------
+    table : signals at the communication points, ``time`` first
+    fields : arrays over time as in ``fields.h5``; empty for a general graph
+    fmus : file and SHA-256 of every component
+    """
+
+    scenario: Scenario
+    exchange: str
+    log: Log
+    table: Table
+    fields: dict[str, np.ndarray]
+    fmus: dict[str, dict[str, str]]
+
+    @property
+    def steps_table(self) -> Table:
+        """One row a macro step: what the master needed and reached."""
+        steps = self.log.steps
+        names = (
+            "time",
+            "iterations",
+            "residual",
+            "subdivisions",
+            "columns",
+            "converged",
+            "estimate",
+            "power_residual",
+        )
+        return {name: np.array([getattr(step, name) for step in steps]) for name in names}
+
+    @property
+    def master(self) -> str:
+        """The master by its name."""
+        return self.scenario.simulation.master
+
+    @property
+    def label(self) -> str:
+        """Master and macro step, as folders are called."""
+        return run_label(self.master, self.log.macro_step)
+
+    @property
+    def record(self) -> Record:
+        """What the pictures are drawn from."""
+        return Record(self.master, self.log.macro_step, self.table, self.steps_table, self.fields)
+
+    @property
+    def fallen(self) -> list[str]:
+        """The contacts that the cable has left."""
+        return [
+            name.removesuffix(".status")
+            for name, values in self.table.items()
+            if name.startswith("contact") and name.endswith(".status") and np.any(values == LEFT_THE_GROOVE)
+        ]
+
+
+def exchange_of(scenario: Scenario) -> str:
+    """Return the contact's exchange: the scenario's, else what suits the master."""
+    implicit = MASTERS[scenario.simulation.master].IMPLICIT
+    return scenario.simulation.exchange or ("waveform" if implicit else "point")
+
+
+@contextmanager
+def opened(scenario: Scenario) -> Iterator[Graph]:
+    """Give the scenario's graph of loaded FMUs; `InputError` if it cannot be made."""
+    try:
+        _require_contract(scenario)
+        graph = landing.graph(scenario, exchange_of(scenario)) if scenario.is_landing else _general_graph(scenario)
+    except (ModuleError, ValueError) as error:
+        raise InputError(f"{scenario.path}: {line}" for line in str(error).splitlines()) from None
+    except FmuError as error:
+        raise RunError(str(error), error.time) from None
+    try:
+        yield graph
+    finally:
+        graph.close()
+
+
+def _require_contract(scenario: Scenario) -> None:
+    """Hold the foreign FMUs of a landing against their contracts."""
+    sections = {"cable": scenario.cable, "robot": scenario.robot, "contact": scenario.contact}
+    for kind, section in sections.items() if scenario.is_landing else ():
+        if section is None or section.fmu is None:
+            continue
+        findings = check_variables(kind, vocabulary.of_fmu(Path(section.fmu)))
+        lines = [f"{kind}.fmu: {f.what} is {f.verdict}: {f.note}" for f in findings if f.verdict in BREAKS]
+        if lines:
+            raise ValueError("\n".join([*lines, f"`orchestrator check {section.fmu}` shows the whole contract"]))
+
+
+def _general_graph(scenario: Scenario) -> Graph:
+    components: dict[str, Fmu] = {}
+    try:
+        for name, section in scenario.components.items():
+            components[name] = Fmu(section.fmu, name)
+            components[name].set_parameters({**section.parameters, **section.inputs})
+        return Graph(components, [_connection(text) for text in scenario.connections])
+    except BaseException:
+        for fmu in components.values():
+            fmu.close()
+        raise
+
+
+def _connection(text: str) -> Connection:
+    source, arrow, target = (part.strip() for part in text.partition("->"))
+    if not (source and arrow and target):
+        raise ValueError(f'connections: {text!r} is not of the form "a.x -> b.u"')
+    return Connection(source, target)
+
+
+class Interruption(FmuError):
+    """Ctrl-C: ends a run at a communication point, so that its results so far are kept."""
+
+    def __init__(self, time: float):
+        super().__init__("run", time, 0, "interrupted")
+
+    def __str__(self) -> str:
+        return f"interrupted at t = {self.time:g} s"
+
+
+@contextmanager
+def interruptible() -> Iterator[Callable[[float], None]]:
+    """Give what a run calls at each communication point; it raises `Interruption` after Ctrl-C.
+
+    A second Ctrl-C ends the program at once.
+    """
+    asked: list[int] = []
+    before = signal.getsignal(signal.SIGINT)
+
+    def ask(number: int, _: Any) -> None:
+        asked.append(number)
+        signal.signal(signal.SIGINT, before)
+
+    def check(time: float) -> None:
+        if asked:
+            raise Interruption(time)
+
+    signal.signal(signal.SIGINT, ask)
+    try:
+        yield check
+    finally:
+        signal.signal(signal.SIGINT, before)
+
+
+def run(scenario: Scenario, progress: Progress = lambda _: None) -> Coupled:
+    """Run the scenario coupled. A failure in mid-run does not raise: `log.error` says it."""
+    with opened(scenario) as graph:
+        log = _simulated(scenario, graph, progress)
+        fmus = {n: {"file": str(f.path), "sha256": f.sha256} for n, f in graph.components.items()}
+    if log.error is not None and len(log.time) < 2:
+        raise RunError(str(log.error), 0.0)
+    fields, table = split_fields(scenario, {"time": log.time, **dict(zip(log.signals, log.values.T, strict=True))})
+    return Coupled(scenario, exchange_of(scenario) if scenario.is_landing else "", log, table, fields, fmus)
+
+
+def _simulated(scenario: Scenario, graph: Graph, progress: Progress) -> Log:
+    simulation = scenario.simulation
+    with interruptible() as check:
+
+        def on_step(report: StepReport) -> None:
+            progress(report.time)
+            check(report.time)
+
+        try:
+            master = MASTERS[simulation.master](graph, **scenario.master)
+            times = 0.0, simulation.stop_time, simulation.macro_step
+            return simulate(graph, master, *times, record=recorded(graph), on_step=on_step)
+        except (ValueError, TypeError) as error:
+            raise InputError(f"{scenario.path}: {error}") from None
+        except FmuError as error:
+            raise RunError(str(error), error.time) from None
+
+
+def recorded(graph: Graph) -> list[str]:
+    """Return the signals worth keeping: outputs, without unused ports and what only serves the coupling."""
+    contacts = sum(name.startswith("contact") for name in graph.components)
+    return [
+        f"{component}.{name}"
+        for component, fmu in graph.components.items()
+        for name, port in fmu.ports.items()
+        if port.causality == "output" and port.kind != "string" and not _only_couples(name, contacts)
+    ]
+
+
+def _only_couples(name: str, contacts: int) -> bool:
+    """Whether an output is that of an unused port, or a mean or rate that only serves the coupling."""
+    unused = re.match(r"(?:port|wheel)\[(\d+)\]", name)
+    return bool(
+        re.search(r"_(mean|rate)\.[xyz]$|\.rotation(_mean)?\.[xyz]$", name)
+        or (unused and 0 < contacts < int(unused[1]))
+    )
+
+
+def split_fields(scenario: Scenario, table: Table) -> tuple[dict[str, np.ndarray], Table]:
+    """Return the cable's shape and tension over time as arrays, and the table without them."""
+    rest = {name: values for name, values in table.items() if not name.startswith("cable.shape[")}
+    return landing.cable_fields(scenario, table) if scenario.is_landing else {}, rest
+
+
+def reference(scenario: Scenario, macro_steps: Iterable[float], progress: Progress = lambda _: None) -> Reference:
+    """Return the reference at the communication points of all `macro_steps`."""
+    steps = list(macro_steps)
+    if scenario.is_landing and landing.has_monolithic(scenario):
+        return _monolithic_reference(scenario, communication_times(scenario.simulation.stop_time, steps), progress)
+    return _fine_reference(scenario, steps, progress)
+
+
+def _monolithic_reference(scenario: Scenario, times: np.ndarray, progress: Progress) -> Reference:
+    try:
+        solution = monolithic.solve(lambda: landing.problem(scenario), times, progress=progress)
+    except ModuleError as error:
+        raise RunError(str(error)) from None
+    fields, table = split_fields(scenario, {"time": times, **solution.signals})
+    contacts = sum(name.endswith(".normal_force") for name in table)
+    table = {name: values for name, values in table.items() if not _only_couples(name.partition(".")[2], contacts)}
+    estimates = {name: solution.estimated_error[name] for name in table if name != "time"}
+    return Reference("monolithic", table, solution.wall_s, estimates, fields)
+
+
+def _fine_reference(scenario: Scenario, macro_steps: list[float], progress: Progress) -> Reference:
+    """Return the same graph at a much smaller macro step; its error is taken from one twice as large."""
+    common = common_divisor(macro_steps)
+    fine, coarse = (_completed(scenario.changed(macro_step=common / n), progress) for n in (8, 4))
+    kind = f"coupled, {fine.master}, macro step {fine.log.macro_step:g} s"
+    return Reference(kind, fine.table, fine.log.wall, dict(largest_difference(coarse.table, fine.table)))
+
+
+def _completed(scenario: Scenario, progress: Progress) -> Coupled:
+    coupled = run(scenario, progress)
+    if coupled.log.error is not None:
+        raise RunError(str(coupled.log.error), coupled.log.error.time)
+    return coupled
+
+
+def common_divisor(steps: Iterable[float]) -> float:
+    """Return the largest step of which all `steps` are multiples, to nine digits."""
+    fractions = [Fraction(step).limit_denominator(10**9) for step in steps]
+    denominator = reduce(lambda a, b: a * b // gcd(a, b), (f.denominator for f in fractions))
+    return reduce(gcd, (int(f * denominator) for f in fractions)) / denominator
+
+
+def held_against(coupled: Coupled, reference: Reference) -> Run:
+    """Return the errors and the cost of one coupled run."""
+    log = coupled.log
+    return Run(
+        master=coupled.master,
+        macro_step=log.macro_step,
+        steps=len(log.steps),
+        iterations_per_step=log.iterations_per_step,
+        unconverged_steps=log.unconverged,
+        cable_steps=log.solves.get("cable", max(log.solves.values(), default=0)),
+        wall_s=log.wall,
+        signals=signal_errors(coupled.table, reference.table),
+    )
+
+
+def summary(coupled: Coupled) -> dict[str, Any]:
+    """Return what ``summary.json`` holds: cost, convergence, extremes of the signals, interface work."""
+    log, scenario = coupled.log, coupled.scenario
+    simulated = float(log.time[-1] - log.time[0])
+    return {
+        "scenario": scenario.name,
+        "title": scenario.title,
+        "stiffness_set": scenario.cable.stiffness_set if scenario.cable else None,
+        "robot": scenario.robot.model or scenario.robot.fmu if scenario.robot else None,
+        "master": coupled.master,
+        "exchange": coupled.exchange or None,
+        "macro_step": log.macro_step,
+        "simulated_s": simulated,
+        "wall_s": log.wall,
+        "wall_per_simulated_s": log.wall / simulated if simulated > 0.0 else None,
+        "wall_components_s": log.wall_components,
+        "steps": len(log.steps),
+        "solves": log.solves,
+        "iterations_per_step": log.iterations_per_step,
+        "unconverged_steps": log.unconverged,
+        "left_the_groove": coupled.fallen,
+        "interface_work_J": {name: float(work[-1]) for name, work in log.energy.items()},
+        "extremes": {n: _extremes(log.time, values) for n, values in coupled.table.items() if n != "time"},
+    }
+
+
+def _extremes(time: np.ndarray, values: np.ndarray) -> dict[str, float]:
+    low, high = int(np.argmin(values)), int(np.argmax(values))
+    pairs = {
+        "start": values[0],
+        "end": values[-1],
+        "min": values[low],
+        "min_time": time[low],
+        "max": values[high],
+    }
+    return {name: float(value) for name, value in {**pairs, "max_time": time[high]}.items()}
+
+
+def write(directory: RunDirectory, coupled: Coupled, reference: Reference | None = None) -> None:
+    """Write all files of a coupled run, the manifest last; an interrupted run is marked as incomplete."""
+    directory.write_table("results.csv", coupled.table)
+    directory.write_table("iterations.csv", coupled.steps_table)
+    if coupled.fields:
+        directory.write_fields("fields.h5", coupled.fields, FIELD_UNITS)
+    directory.write_json("summary.json", summary(coupled))
+    signals = list(coupled.scenario.simulation.tolerances)
+    draw_run(directory.path, coupled.record, reference.table if reference else None, signals)
+    error = coupled.log.error
+    directory.write_manifest(manifest(coupled.scenario, coupled.fmus), error=str(error) if error else None)
+
+
+def manifest(scenario: Scenario, fmus: Mapping[str, Any]) -> dict[str, Any]:
+    """Return what a run depends on: the resolved scenario, the source of each value, the FMUs."""
+    return {
+        "scenario": str(scenario.path),
+        "resolved": scenario.model_dump(exclude_none=True),
+        "provenance": dict(scenario.provenance),
+        "fmus": fmus,
+    }
+
+
+def compared(runs: list[Coupled], reference: Reference) -> Comparison:
+    """Hold all runs against the reference."""
+    tolerance = runs[0].scenario.simulation.tolerances
+    return Comparison(reference, [held_against(coupled, reference) for coupled in runs], dict(tolerance))
+
+
+def write_comparison(directory: RunDirectory, comparison: Comparison, runs: list[Coupled]) -> None:
+    """Write ``comparison.json``, the reference and one run directory for each run, then the manifest."""
+    reference, failures = comparison.reference, [str(c.log.error) for c in runs if c.log.error]
+    directory.write_table("reference.csv", reference.table)
+    if reference.fields:
+        directory.write_fields("reference.h5", reference.fields, FIELD_UNITS)
+    for coupled in runs:
+        write(RunDirectory(directory.path / coupled.label), coupled, reference)
+    directory.write_json("comparison.json", comparison.content())
+    draw_comparison(directory.path, comparison, [coupled.record for coupled in runs])
+    error = "; ".join(failures) or None
+    directory.write_manifest(manifest(runs[0].scenario, runs[0].fmus), error=error)

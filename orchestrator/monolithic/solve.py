@@ -1,0 +1,234 @@
+"""Drive the monolithic solver: step control, output, and an estimate of its own error."""
+
+from __future__ import annotations
+
+import time as clock
+from collections.abc import Callable, Sequence
+from dataclasses import dataclass, field
+
+import numpy as np
+
+from fmus.cable import dynamics
+from fmus.cable.module import Cable
+from fmus.contact.law import law_parameters
+from fmus.contact.module import Contact
+from fmus.robot import rigid_body
+from fmus.robot.module import Robot, body_parameters, initial_state
+from fmus.rotations import follow_euler
+from fmus.time_integration import collocation
+from fmus.variables import ModuleError
+from orchestrator.monolithic import system as kernels
+from orchestrator.monolithic.system import N_CONTACT, N_ROBOT, State, System
+
+SAFETY, GROW, SHRINK = 0.8, 2.0, 0.2
+SHORTEST = 1e-7
+"""s; a shorter step means that the equations cannot be solved."""
+LONGEST = 2.5e-3
+"""s; longest step at the default tolerance, it resolves the cable's waves (docs/verification.md)."""
+TOLERANCE = 1e-8
+"""m, local error of the robot's position a step allowed by default."""
+NEWTON = 1e-12
+
+
+@dataclass
+class Problem:
+    """Initialised modules that make one system; one contact a wheel, in the order of the wheels."""
+
+    cable: Cable
+    robot: Robot
+    contacts: list[Contact]
+
+
+@dataclass
+class Solution:
+    """Signals of a monolithic run at the output times.
+
+    Attributes
+    ----------
+    time : (n,) s
+    signals : ``component.variable`` → (n,); components are cable, robot, contact1 …
+    wall_s : wall time of the solution returned, warm; `wall_estimate_s` that of the coarser one besides
+    steps : number of steps
+    tolerance : local tolerance, m
+    estimated_error : signal → largest difference from the solution at a tenth as tight a tolerance, unit of the signal
+    energy : (n, 7) kinetic, elastic, gravitational, dissipated by cable, walls, friction, and their sum less the control's work
+    """
+
+    time: np.ndarray
+    signals: dict[str, np.ndarray]
+    wall_s: float
+    steps: int
+    tolerance: float
+    wall_estimate_s: float = 0.0
+    estimated_error: dict[str, float] = field(default_factory=dict)
+
+
+class Integrator:
+    """The system's state and the steps that advance it."""
+
+    def __init__(self, problem: Problem, tolerance: float = TOLERANCE):
+        self.problem, self.tolerance = problem, tolerance
+        cable, robot = problem.cable, problem.robot
+        self.method = collocation(cable["spectral_radius"])
+        n_wheels = len(problem.contacts)
+        prm = body_parameters(robot.values, robot.table)
+        contacts = np.stack([law_parameters(c.values, c.table) for c in problem.contacts])
+        self.system = System(cable.model, self.method, prm, contacts, _control(robot, n_wheels))
+        memory = np.zeros((n_wheels, N_CONTACT))
+        memory[:, kernels.S] = [c.values[c.table.index["initial.s"]] for c in problem.contacts]
+        self.state = State(cable.state.copy(), initial_state(robot.values, robot.table), np.zeros((2, N_ROBOT)), memory)
+        self.work = dynamics.make_work(cable.model.weight.size, cable.state.size)
+        self.space = kernels.make_space(cable.model.weight.size, n_wheels)
+        self.longest = LONGEST * (tolerance / TOLERANCE) ** 0.25
+        self.h = 0.02 * self.longest
+        self.steps, self.iterations, self._fresh, self._used_h = 0, 0, 2, 0.0
+        if kernels.settle(self.system, self.state, False, self.space, self.work) != kernels.OK:
+            raise ModuleError("monolithic: the contact law fails at the start; check the initial pose of the robot")
+
+    def advance(self, t: float, end: float) -> None:
+        """Integrate from `t` to `end` with controlled steps; raises `ModuleError` if none is short enough."""
+        while end - t > 1e-12 * max(1.0, end):
+            left = end - t
+            h = left / max(1.0, np.ceil(left / min(self.h, self.longest) - 1e-9))
+            t += self._try(t, h)
+
+    def _try(self, t: float, h: float) -> float:
+        """Try one step of `h`; return what was advanced (0 if it is to be repeated) and choose the next length."""
+        fresh = self._fresh > 0 or abs(h - self._used_h) > 1e-9 * h
+        status, error, iterations = kernels.step(
+            self.system, self.state, h, NEWTON, fresh, self.space, self.work, self.tolerance
+        )
+        self.iterations += iterations
+        if status != kernels.OK or error > self.tolerance:
+            factor = SHRINK if status != kernels.OK else max(SHRINK, SAFETY * (self.tolerance / error) ** 0.25)
+            self.h, self._fresh = h * factor, 1
+            if self.h < SHORTEST:
+                raise ModuleError(
+                    f"monolithic: no step is short enough at t = {t:g} s; check stiffness and damping of the contact"
+                )
+            return 0.0
+        self.steps += 1
+        self._used_h, self._fresh = h, 1 if iterations > 4 else 0
+        wanted = h * min(GROW, SAFETY * (self.tolerance / max(error, 1e-300)) ** 0.25)
+        if wanted > 1.3 * h or wanted < h:  # a step kept is a matrix kept
+            self.h = wanted
+        return h
+
+
+def _control(robot: Robot, n_wheels: int) -> np.ndarray:
+    """Return thrust, torque and drive torques, constant inputs of the robot, in the places of the kernels' loads."""
+    value = {name: float(robot.values[robot.table.index[name]]) for name in robot.table.names("input")}
+    loads = np.zeros(rigid_body.BODY_LOADS + rigid_body.WHEEL_LOADS * n_wheels)
+    loads[:4] = value["thrust"], value["torque.x"], value["torque.y"], value["torque.z"]
+    for k in range(n_wheels):
+        loads[rigid_body.BODY_LOADS + rigid_body.WHEEL_LOADS * k + 6] = value[f"wheel[{k + 1}].drive_torque"]
+    return loads
+
+
+class _Recorder:
+    """Writes the modules' own outputs at the output times."""
+
+    SKIP = ("_mean.", ".work", ".rotation", "_rate.")
+
+    def __init__(self, integrator: Integrator, n: int):
+        self.integrator = integrator
+        problem = integrator.problem
+        self.cable, self.robot = problem.cable, problem.robot
+        self.cable_names = self._names(self.cable.table.names("output"))
+        self.robot_names = self._names(self.robot.table.names("output"))
+        self.cable_at = self.cable.table.indices(self.cable_names)
+        self.robot_at = self.robot.table.indices(self.robot_names)
+        self.contact_names = (
+            "normal_force", "friction_force", "penetration", "slip_velocity", "contact_length", "status",
+            "dissipated_energy", "strain_energy", "cable.s",
+        )  # fmt: skip
+        n_wheels = len(problem.contacts)
+        self.cable_rows = np.zeros((n, len(self.cable_names)))
+        self.robot_rows = np.zeros((n, len(self.robot_names)))
+        self.contact_rows = np.zeros((n, n_wheels, len(self.contact_names)))
+        self._robot_state = self.robot.state.copy()
+        self._angles = self._robot_state[rigid_body.ANGLES : rigid_body.ANGLES + 3]
+
+    def _names(self, names: Sequence[str]) -> list[str]:
+        return [name for name in names if not any(part in name for part in self.SKIP)]
+
+    def record(self, i: int) -> None:
+        """Write row `i` from the present state."""
+        state, system, space = self.integrator.state, self.integrator.system, self.integrator.space
+        kernels.settle(system, state, False, space, self.integrator.work)
+        out = space.out[0]
+        for k in range(len(state.contacts)):
+            self.cable.values[self.cable.table.index[f"port[{k + 1}].s"]] = state.contacts[k, kernels.S]
+            row, memory = out[k], state.contacts[k]
+            self.contact_rows[i, k] = (
+                row[12], np.hypot(row[13], row[14]), row[15], np.hypot(row[16], row[17]), row[18],
+                3.0 if memory[kernels.LEFT] else row[19], memory[kernels.WALLS] + memory[kernels.FRICTION],
+                row[25] + row[26], memory[kernels.S],
+            )  # fmt: skip
+        self.cable.state[:] = state.cable
+        self.cable.refresh()
+        self.cable_rows[i] = self.cable.values[self.cable_at]
+        self._robot_state[: rigid_body.RIGID] = state.robot
+        follow_euler(state.robot[3:7], self._angles)
+        values = np.zeros(rigid_body.BODY_OUTPUTS + rigid_body.WHEEL_OUTPUTS * self.robot.n_wheels)
+        rigid_body.outputs(system.robot, self._robot_state, values)
+        self.robot_rows[i] = values[self.robot_at - len(self.robot.table) + values.size]
+
+    def signals(self) -> dict[str, np.ndarray]:
+        """Return every signal by name."""
+        found = {f"cable.{name}": self.cable_rows[:, j] for j, name in enumerate(self.cable_names)}
+        found |= {f"robot.{name}": self.robot_rows[:, j] for j, name in enumerate(self.robot_names)}
+        for k in range(self.contact_rows.shape[1]):
+            found |= {f"contact{k + 1}.{name}": self.contact_rows[:, k, j] for j, name in enumerate(self.contact_names)}
+        return found
+
+
+def integrate(
+    make: Callable[[], Problem],
+    times: np.ndarray,
+    tolerance: float = TOLERANCE,
+    progress: Callable[[float], None] | None = None,
+) -> Solution:
+    """Solve once.
+
+    Parameters
+    ----------
+    make : returns the initialised problem
+    times : (n,) ascending output times, s; the first one is the start
+    tolerance : local error of the robot's position allowed a step, m
+    progress : called with the time reached
+    """
+    integrator = Integrator(make(), tolerance)
+    recorder = _Recorder(integrator, len(times))
+    recorder.record(0)
+    start = clock.perf_counter()
+    for i in range(1, len(times)):
+        integrator.advance(float(times[i - 1]), float(times[i]))
+        recorder.record(i)
+        if progress is not None:
+            progress(float(times[i]))
+    wall = clock.perf_counter() - start
+    return Solution(np.asarray(times), recorder.signals(), wall, integrator.steps, tolerance)
+
+
+def solve(
+    make: Callable[[], Problem],
+    times: np.ndarray,
+    tolerance: float = TOLERANCE,
+    estimate: bool = True,
+    progress: Callable[[float], None] | None = None,
+) -> Solution:
+    """Solve, and estimate the error by a second solution with a tolerance ten times as wide.
+
+    The estimate is the whole difference of the two, an upper bound for the error of the one returned as long as the
+    error falls with the tolerance. Parameters as in `integrate`.
+    """
+    if not estimate:
+        return integrate(make, times, tolerance, progress)
+    coarse = integrate(make, times, 10.0 * tolerance, progress)
+    fine = integrate(make, times, tolerance, progress)
+    fine.wall_estimate_s = coarse.wall_s
+    fine.estimated_error = {
+        name: float(np.max(np.abs(values - coarse.signals[name]))) for name, values in fine.signals.items()
+    }
+    return fine

@@ -1,0 +1,107 @@
+"""What can be named in a scenario: variables of modules and FMUs, masters and their options, robots."""
+
+from __future__ import annotations
+
+import zipfile
+from inspect import signature
+from pathlib import Path
+from typing import Any
+
+from fmus.variables import Kind, Variable
+from orchestrator.errors import InputError
+
+KINDS: dict[str, Kind] = {"Real": "real", "Float64": "real", "Float32": "real", "Boolean": "boolean"}
+KINDS |= {
+    "String": "string",
+    "Integer": "integer",
+    "Enumeration": "integer",
+    "Int32": "integer",
+    "Int64": "integer",
+}
+
+
+def of_module(kind: str, robot: str | None = None) -> dict[str, Variable]:
+    """Return the variables of our own module by name, from its table.
+
+    Parameters
+    ----------
+    kind : ``cable``, ``contact`` or ``robot``
+    robot : name of the catalogue; the number of its wheels decides which variables there are
+    """
+    if kind == "cable":
+        from fmus.cable.module import Cable
+
+        table = Cable.table
+    elif kind == "contact":
+        from fmus.contact.module import Contact
+
+        table = Contact.table
+    else:
+        from orchestrator.robots import load_robot
+
+        return robot_variables(load_robot(robot).n_wheels if robot in robots() else 1)
+    return {v.name: v for v in table.variables}
+
+
+def robot_variables(n_wheels: int) -> dict[str, Variable]:
+    """Return the variables of our robot module with `n_wheels` wheels by name."""
+    from fmus.robot.module import robot_table
+
+    return {v.name: v for v in robot_table(n_wheels).variables}
+
+
+def of_fmu(path: Path) -> dict[str, Variable]:
+    """Return the variables of the FMU at `path` by name; raise `InputError` if it is none."""
+    known: dict[str, Variable] = {}
+    for v in description(path).modelVariables:
+        parameter = v.causality == "parameter" or (v.causality == "local" and v.variability == "tunable")
+        known[v.name] = Variable(
+            v.name,
+            "parameter" if parameter else "input" if v.causality == "input" else "output",
+            v.unit or (v.declaredType.unit if v.declaredType else None) or "1",
+            v.start if v.start is not None else "",
+            v.description or "",
+            KINDS.get(v.type, "real"),
+        )
+    return known
+
+
+def description(path: Path) -> Any:
+    """Return FMPy's model description of the FMU at `path`; raise `InputError` if it is none."""
+    if not path.is_file():
+        raise InputError(f"{path}: no such file")
+    if not zipfile.is_zipfile(path):
+        raise InputError(f"{path}: not an FMU: not a zip archive")
+    from fmpy import read_model_description
+
+    try:
+        return read_model_description(str(path), validate=False)
+    except Exception as error:  # FMPy and lxml raise many kinds; each means the same to the user
+        raise InputError(f"{path}: not an FMU: its modelDescription.xml cannot be read: {error}") from None
+
+
+def masters() -> dict[str, dict[str, Any]]:
+    """Return the options of every master, with their default values, by its name."""
+    from orchestrator.masters import MASTERS
+
+    return {name: _options(master) for name, master in MASTERS.items()}
+
+
+def _options(master: type) -> dict[str, Any]:
+    """Return the keyword arguments of `master`; those that it hands on are its base class's."""
+    found: dict[str, Any] = {}
+    for base in master.__mro__:
+        if "__init__" not in vars(base):
+            continue
+        parameters = signature(vars(base)["__init__"]).parameters.values()
+        found |= {p.name: p.default for p in parameters if p.kind is p.KEYWORD_ONLY and p.name not in found}
+        if not any(p.kind is p.VAR_KEYWORD for p in parameters):
+            break
+    return found
+
+
+def robots() -> list[str]:
+    """Return the names of the robots of the catalogue."""
+    from orchestrator.robots import FOLDER
+
+    return sorted(path.stem for path in FOLDER.glob("*.toml"))

@@ -1,0 +1,1 @@
+"""A damped oscillator: a small module with every kind of variable."""

@@ -1,0 +1,328 @@
+"""The contact law at one instant: closed forms, an independent quadrature, invariants."""
+
+import math
+
+import numpy as np
+import pytest
+from hypothesis import given, settings
+from hypothesis import strategies as st
+from scipy.integrate import quad, quad_vec, solve_ivp
+from scipy.optimize import brentq
+from scipy.spatial.transform import Rotation
+
+from fmus.contact.law import LEFT, NODES, OPEN, SLIP, STICK, contact_wrench, law_parameters
+from fmus.contact.module import Contact
+
+HALF = math.radians(50.0)
+SIN, COS = math.sin(HALF), math.cos(HALF)
+APEX = 0.075 - 0.04 / math.tan(HALF)
+SEAT = APEX + 0.009 / SIN  # radial distance at which the cable just touches both walls
+
+
+def parameters(**settings):
+    values = Contact.table.defaults()
+    Contact.table.assign(values, settings)
+    return law_parameters(values, Contact.table)
+
+
+def wheel_above(depth=0.0, lateral=0.0, velocity=(0.0, 0.0, 0.0), slip_rate=(0.0, 0.0)):
+    """A level cable along +Y under a wheel whose centre is `depth` (m) below first touch of the groove."""
+    motion = np.zeros(24)
+    motion[4] = 1.0
+    motion[12:15] = -lateral, 0.0, SEAT - depth
+    motion[15] = 1.0
+    motion[18:21] = velocity
+    motion[7], motion[6] = slip_rate
+    return motion
+
+
+def wrench(motion, slip=(0.0, 0.0), **settings):
+    out = np.zeros(32)
+    assert contact_wrench(parameters(**settings), motion, np.array(slip, float), out) == 0
+    return out
+
+
+def random_motion(rng, depth=None):
+    """A cable and a wheel in a random, but plausible pose; the offset from p is some centimetres."""
+    motion = wheel_above(rng.uniform(-1e-3, 6e-3) if depth is None else depth, rng.uniform(-3e-3, 3e-3))
+    motion[0:3] += 0.03 * rng.normal() * motion[3:6]
+    yaw = Rotation.from_rotvec([0.02 * rng.normal(), 0.02 * rng.normal(), 0.05 * rng.normal()])
+    motion[3:6] = yaw.apply(motion[3:6]) * rng.uniform(0.99, 1.01)
+    motion[6:12] = 0.3 * rng.normal(size=6)
+    motion[18:24] = 0.3 * rng.normal(size=6)
+    return turned(motion, Rotation.from_rotvec(rng.normal(size=3)))
+
+
+def turned(motion, rotation):
+    return rotation.apply(motion.reshape(-1, 3)).ravel()
+
+
+def reference_walls(motion, k=1e8, n=2.5, D=1.0, l0=0.06):
+    """Force and moments from the formulas, point by point, by adaptive quadrature."""
+    p, t, dp, dt, w, a, dw, om = motion.reshape(8, 3)
+    u = t / np.linalg.norm(t)
+    turn = np.cross(t, dt) / (t @ t)
+    foot = (w - p) @ u
+
+    def density(x):
+        point = p + (foot + x) * u
+        d = point - w
+        y = d @ a
+        radial = d - y * a
+        rho = np.linalg.norm(radial)
+        v = dp + (foot + x) * np.cross(turn, u) - dw - np.cross(om, d)
+        total = np.zeros(7)
+        for side in (1.0, -1.0):
+            normal = -side * COS * a + SIN * radial / rho
+            delta = max(0.009 - (SIN * (rho - APEX) - side * COS * y), 0.0)
+            f = k / l0 * delta**n * max(1.0 - D * (normal @ v), 0.0)
+            total += np.concatenate([f * normal, np.cross((foot + x) * u, f * normal), [f]])
+        return total
+
+    edges = np.linspace(-l0 / 2, l0 / 2, 13)
+    return quad_vec(density, edges[0], edges[-1], epsabs=1e-9, epsrel=1e-11, points=edges, limit=4000)[0]
+
+
+def test_seat_depth_of_a_point_contact():
+    """Two walls at half the groove angle from the radial direction: W = 2 k delta^n sin(theta/2)."""
+    weight = 38.0 * 9.8
+    delta = (weight / (2.0 * 1e8 * SIN)) ** (1 / 2.5)
+    out = wrench(wheel_above(delta / SIN), max_contact_length=1e-7)
+    assert out[8] == pytest.approx(weight, rel=1e-9)
+    assert out[2] == pytest.approx(-weight, rel=1e-9)
+    assert out[12] == pytest.approx(weight / SIN, rel=1e-9)
+    assert out[15] == pytest.approx(delta, rel=1e-12)
+    assert out[25] == pytest.approx(2.0 * 1e8 * delta**3.5 / 3.5, rel=1e-9)
+
+
+@pytest.mark.parametrize("seed", range(12))
+def test_walls_against_adaptive_quadrature(seed):
+    """The rule on the touched piece is right to 4e-6 of the normal force (next test)."""
+    motion = random_motion(np.random.default_rng(seed))
+    out = wrench(motion, friction_coefficient=0.0)
+    expected = reference_walls(motion)
+    scale = expected[6]
+    np.testing.assert_allclose(out[0:3], expected[0:3], atol=4e-6 * scale + 1e-12)
+    np.testing.assert_allclose(out[3:6], expected[3:6], atol=4e-6 * 0.06 * scale + 1e-12)
+    assert out[12] == pytest.approx(scale, rel=4e-6, abs=1e-12)
+
+
+@pytest.mark.parametrize(
+    ("n", "cut", "error"), [(1.0, 1.0, 1e-14), (1.5, 1.0, 4e-5), (2.5, 1.0, 4e-6), (2.5, 0.9, 1e-7)]
+)
+def test_rule_of_the_touched_piece(n, cut, error):
+    """A load (1 - x^2)^n ending at zero or cut off: Gauss-Legendre converges like 1 / points^(2 n + 2)."""
+    exact = quad(lambda x: (1 - x * x) ** n, -cut, cut, epsabs=1e-15, epsrel=1e-13)[0]
+    for points in (len(NODES), 2 * len(NODES)):
+        x, w = np.polynomial.legendre.leggauss(points)
+        assert cut * w @ (1 - (cut * x) ** 2) ** n == pytest.approx(exact, rel=error)
+        error = max(error * 1.3 / 2 ** (2 * n + 2), 1e-14)
+
+
+def test_contact_length_is_that_of_the_geometry_and_grows():
+    """delta = 0 where the radial distance is that of first touch: x^2 + rho_0^2 = SEAT^2."""
+    lengths = []
+    for depth in (1e-4, 1e-3, 3e-3):
+        lengths.append(wrench(wheel_above(depth))[18])
+        assert lengths[-1] == pytest.approx(2.0 * math.sqrt(SEAT**2 - (SEAT - depth) ** 2), rel=1e-9)
+    assert lengths == sorted(lengths)
+    assert wrench(wheel_above(0.02))[18] == pytest.approx(0.06, rel=1e-12)
+    assert wrench(wheel_above(-1e-9))[18] == 0.0
+
+
+def test_lateral_self_centring():
+    """Small lateral offset y of a point contact: F_y = -2 n k delta^(n-1) cos^2(theta/2) y on the cable."""
+    delta, y = 4e-3, 1e-7
+    out = wrench(wheel_above(delta / SIN, lateral=y), max_contact_length=1e-7, friction_coefficient=0.0)
+    assert out[0] == pytest.approx(-2.0 * 2.5 * 1e8 * delta**1.5 * COS**2 * y, rel=1e-6)
+
+
+def test_yaw_restoring_moment():
+    """Small yaw psi: the walls' difference over x and the radial forces at the lever psi x turn back."""
+    depth, psi, k, l0 = 3e-3, 1e-6, 1e8, 0.06
+    motion = wheel_above(depth)
+    motion[3:6] = math.sin(psi), math.cos(psi), 0.0  # right-handed turn about z is -psi
+
+    def stiffness(x):
+        rho = math.hypot(SEAT - depth, x)
+        delta = max(SIN * (SEAT - rho), 0.0)
+        return x**2 * (2.0 * 2.5 * k * delta**1.5 * COS**2 + 2.0 * k * delta**2.5 * SIN / rho) / l0
+
+    end = math.sqrt(SEAT**2 - (SEAT - depth) ** 2)
+    expected = quad(stiffness, -end, end, epsabs=0.0, epsrel=1e-10)[0]
+    assert wrench(motion, friction_coefficient=0.0)[5] == pytest.approx(expected * psi, rel=1e-4)
+
+
+@pytest.mark.parametrize("seed", range(4))
+def test_wall_force_is_the_gradient_of_the_wall_energy(seed):
+    """Without damping the force is -dU/dp; central differences of the energy, step 1e-6 m."""
+    motion = random_motion(np.random.default_rng(seed), depth=2e-3)
+    settings = {"damping": 0.0, "friction_coefficient": 0.0}
+    out = wrench(motion, **settings)
+    for i in range(3):
+        energies = []
+        for h in (1e-6, -1e-6):
+            moved = motion.copy()
+            moved[i] += h
+            energies.append(wrench(moved, **settings)[25])
+        assert out[i] == pytest.approx(-(energies[0] - energies[1]) / 2e-6, abs=2e-5 * out[12])
+
+
+@settings(max_examples=150, deadline=None)
+@given(seed=st.integers(0, 2**32 - 1), damping=st.floats(0.0, 100.0))
+def test_never_pulls_and_dissipates(seed, damping):
+    rng = np.random.default_rng(seed)
+    motion = random_motion(rng)
+    out = wrench(motion, 1e-3 * rng.normal(size=2), damping=damping)
+    d = motion[0:3] - motion[12:15]
+    radial = d - (d @ motion[15:18]) * motion[15:18]
+    walls = wrench(motion, damping=damping, friction_coefficient=0.0)
+    assert out[12] >= 0.0
+    assert walls[0:3] @ radial >= -1e-9 * out[12]
+    assert out[23] >= 0.0
+    assert out[24] >= -1e-12 * out[12]
+    assert math.hypot(out[13], out[14]) <= 0.7 * out[12] * (1 + 1e-12)
+
+
+@settings(max_examples=200, deadline=None)
+@given(seed=st.integers(0, 2**32 - 1))
+def test_any_pose_gives_finite_passive_forces(seed):
+    """Wheels upside down, along the cable, through it: the law stays defined."""
+    rng = np.random.default_rng(seed)
+    motion = rng.normal(size=24)
+    motion[12:15] = motion[0:3] + 0.05 * rng.normal(size=3)
+    motion[15:18] /= np.linalg.norm(motion[15:18])
+    if seed % 3 == 0:
+        motion[15:18] = motion[3:6] / np.linalg.norm(motion[3:6])
+    out = wrench(motion, 1e-3 * rng.normal(size=2))
+    assert np.isfinite(out).all()
+    assert out[12] >= 0.0 and out[23] >= 0.0 and 0.0 <= out[18] <= 0.06 * (1 + 1e-12)
+    about_wheel = out[3:6] + np.cross(motion[0:3] - motion[12:15], out[0:3])
+    np.testing.assert_allclose(about_wheel + out[9:12], 0.0, atol=1e-12 * (out[12] + 1e-9))
+
+
+@settings(max_examples=60, deadline=None)
+@given(seed=st.integers(0, 2**32 - 1))
+def test_action_is_reaction(seed):
+    """Forces cancel, and the moments of both about any point: M_c + M_w + (p - w) x F_c = 0."""
+    rng = np.random.default_rng(seed)
+    motion = random_motion(rng)
+    out = wrench(motion, 1e-4 * rng.normal(size=2))
+    scale = out[12] + 1e-9
+    np.testing.assert_allclose(out[0:3] + out[6:9], 0.0, atol=1e-14 * scale)
+    about_wheel = out[3:6] + np.cross(motion[0:3] - motion[12:15], out[0:3])
+    np.testing.assert_allclose(about_wheel + out[9:12], 0.0, atol=1e-14 * scale)
+
+
+@settings(max_examples=60, deadline=None)
+@given(seed=st.integers(0, 2**32 - 1))
+def test_turned_and_mirrored_motion_gives_turned_and_mirrored_wrench(seed):
+    rng = np.random.default_rng(seed)
+    motion, slip = random_motion(rng), 1e-5 * rng.normal(size=2)
+    out = wrench(motion, slip)
+    rotation = Rotation.from_rotvec(rng.normal(size=3))
+    after = wrench(turned(motion, rotation), slip)
+    tolerance = 1e-9 * (1.0 + out[12])
+    np.testing.assert_allclose(after[:12], turned(out[:12], rotation), atol=tolerance)
+    np.testing.assert_allclose(after[12:27], out[12:27], atol=tolerance)
+    # mirrored in x: polar vectors change x, axial vectors (moment, angular velocity) change y and z; the
+    # mirrored axle -x is the same wheel as +x, which turns round the lateral bristle
+    polar, axial = np.array([-1.0, 1.0, 1.0]), np.array([1.0, -1.0, -1.0])
+    mirror = np.concatenate([polar, polar, polar, polar, polar, -polar, polar, axial])
+    image = wrench(mirror * motion, slip * [1.0, -1.0])
+    np.testing.assert_allclose(
+        image[:12], np.concatenate([polar, axial, polar, axial]) * out[:12], atol=tolerance
+    )
+    assert image[14] == pytest.approx(-out[14], abs=tolerance)
+
+
+@pytest.mark.parametrize("length", [1e-7, 0.06])
+def test_smooth_at_touch(length):
+    """C2 in the depth: force / depth^2 falls like depth^(1/2) or faster, so F'' starts at 0."""
+    depths = np.array([1e-4, 1e-5, 1e-6])
+    forces = np.array([wrench(wheel_above(d), max_contact_length=length)[12] for d in depths])
+    assert np.all(np.diff(np.log(forces)) / np.diff(np.log(depths)) >= 2.5 - 1e-3)
+    assert wrench(wheel_above(-1e-12))[:12].any() == False  # noqa: E712
+
+
+def test_restitution_of_hunt_crossley():
+    """First integral of m x'' = -K x^n (1 + E x'): E v - ln(1 + E v) is the same before and after, any n.
+
+    For a point contact in the groove the walls' rate is sin(theta/2) of the radial speed: E = D sin(theta/2).
+    """
+    prm, out, none = parameters(max_contact_length=1e-7, friction_coefficient=0.0), np.zeros(32), np.zeros(2)
+
+    def fall(t, x):
+        contact_wrench(prm, wheel_above(x[0], velocity=(0.0, 0.0, -x[1])), none, out)
+        return x[1], -out[8] / 38.0
+
+    def lift(t, x):
+        return x[0] + 1e-15
+
+    lift.terminal, lift.direction = True, -1
+    for speed in (0.1, 0.5, 1.0, 2.0):
+        run = solve_ivp(fall, (0, 1), [0.0, speed], events=lift, rtol=1e-10, atol=1e-14, max_step=1e-3)
+        E = SIN
+        before = E * speed - math.log(1 + E * speed)
+        after = brentq(
+            lambda v, E=E, c=before: -E * v - math.log(1 - E * v) - c, 1e-9, min(speed, (1 - 1e-12) / E)
+        )
+        assert -run.y[1, -1] == pytest.approx(after, rel=1e-6)
+
+
+def test_friction_sticks_up_to_the_coulomb_limit():
+    motion = wheel_above(4e-3)
+    limit = 0.7 * wrench(motion)[12]
+    z = 0.6 * limit / 1e6
+    out = wrench(motion, (z, -z))
+    assert out[19] == STICK
+    np.testing.assert_allclose(out[13:15], [-1e6 * z, 1e6 * z], rtol=1e-14)
+    np.testing.assert_array_equal(out[21:23], [z, -z])
+    out = wrench(motion, (3 * z, -3 * z))
+    assert out[19] == SLIP
+    assert math.hypot(out[13], out[14]) == pytest.approx(limit, rel=1e-14)
+    assert out[1] == pytest.approx(-limit / math.sqrt(2), rel=1e-12)
+    np.testing.assert_allclose(wrench(motion, out[21:23])[21:23], out[21:23], rtol=1e-15)
+
+
+def test_wedge_raises_sliding_friction():
+    """Walls carry W = N sin(theta/2), friction is mu N: sliding takes mu / sin(theta/2) of the load."""
+    motion = wheel_above(4e-3, slip_rate=(0.5, 0.0))
+    out = wrench(motion, (1.0, 0.0), max_contact_length=1e-7, damping=0.0)
+    assert out[19] == SLIP
+    assert -out[1] / out[8] == pytest.approx(0.7 / SIN, rel=1e-9)
+    assert out[24] == pytest.approx(-out[1] * 0.5, rel=1e-12)
+
+
+def test_no_force_no_friction():
+    out = wrench(wheel_above(-1e-3, slip_rate=(1.0, 1.0)), (1e-3, 1e-3))
+    assert out[19] == OPEN
+    assert not out[0:15].any() and not out[21:27].any()
+    assert out[15] == pytest.approx(-1e-3 * SIN, rel=1e-9)
+    np.testing.assert_allclose(out[16:18], [1.0, 1.0])
+
+
+def test_offset_is_arc_length_of_the_foot():
+    motion = wheel_above(2e-3)
+    motion[1] = 0.02
+    motion[4] = 1.01
+    assert wrench(motion)[20] == pytest.approx(-0.02 / 1.01, rel=1e-14)
+
+
+@pytest.mark.parametrize(
+    ("lateral", "radial", "status"),
+    [(0.0, 0.12, OPEN), (0.03, 0.085, OPEN), (0.041, 0.085, OPEN), (0.041, 0.08, LEFT), (0.041, 0.02, LEFT)],
+)
+def test_leaving_the_groove(lateral, radial, status):
+    """Beside the wheel and lower than a cable lying on the rim (75 + 9 mm): left; above the rim: open."""
+    motion = wheel_above(SEAT - radial, lateral=lateral)
+    out = wrench(motion)
+    assert out[19] == status
+    assert not out[0:12].any()
+
+
+def test_failure_is_told():
+    for i, expected in ((4, 1), (15, 2), (12, 3)):
+        motion = wheel_above(1e-3)
+        motion[i] = 0.0 if i != 12 else math.nan
+        assert contact_wrench(parameters(), motion, np.zeros(2), np.zeros(32)) == expected

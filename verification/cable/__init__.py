@@ -1,0 +1,5 @@
+"""Studies of the cable."""
+
+from types import ModuleType
+
+STUDIES: tuple[ModuleType, ...] = ()
