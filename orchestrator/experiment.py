@@ -16,7 +16,7 @@ from typing import Any
 import numpy as np
 
 from fmus.variables import ModuleError
-from orchestrator import landing, monolithic, vocabulary
+from orchestrator import landing, library, monolithic, vocabulary
 from orchestrator.compare import (
     Comparison,
     Reference,
@@ -140,7 +140,7 @@ def _general_graph(scenario: Scenario) -> Graph:
     components: dict[str, Fmu] = {}
     try:
         for name, section in scenario.components.items():
-            components[name] = Fmu(section.fmu, name)
+            components[name] = Fmu(section.fmu or library.module_fmu(str(section.model)), name)
             components[name].set_parameters({**section.parameters, **section.inputs})
         return Graph(components, [_connection(text) for text in scenario.connections])
     except BaseException:
@@ -231,6 +231,7 @@ def recorded(graph: Graph) -> list[str]:
 
 
 def _only_couples(name: str, contacts: int) -> bool:
+    """Whether an output is that of an unused port, or a mean or rate that only serves the coupling."""
     unused = re.match(r"(?:port|wheel)\[(\d+)\]", name)
     return bool(
         re.search(r"_(mean|rate)\.[xyz]$|\.rotation(_mean)?\.[xyz]$", name)
@@ -258,7 +259,10 @@ def _monolithic_reference(scenario: Scenario, times: np.ndarray, progress: Progr
     except ModuleError as error:
         raise RunError(str(error)) from None
     fields, table = split_fields(scenario, {"time": times, **solution.signals})
-    return Reference("monolithic", table, solution.wall_s, solution.estimated_error, fields)
+    contacts = sum(name.endswith(".normal_force") for name in table)
+    table = {name: values for name, values in table.items() if not _only_couples(name.partition(".")[2], contacts)}
+    estimates = {name: solution.estimated_error[name] for name in table if name != "time"}
+    return Reference("monolithic", table, solution.wall_s, estimates, fields)
 
 
 def _fine_reference(scenario: Scenario, macro_steps: list[float], progress: Progress) -> Reference:

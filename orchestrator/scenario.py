@@ -108,11 +108,18 @@ class Landing(Section):
 
 
 class Component(Section):
-    """One FMU of a general graph."""
+    """One FMU of a general graph: any (`fmu`), or one of our modules (`model`)."""
 
-    fmu: str
+    model: str | None = None
+    fmu: str | None = None
     parameters: Settings = {}
     inputs: Settings = {}
+
+    @model_validator(mode="after")
+    def _one_source(self) -> Component:
+        if (self.model is None) == (self.fmu is None):
+            raise ValueError(f'give either fmu = "FILE.fmu" or model = one of {", ".join(vocabulary.MODELS)}')
+        return self
 
 
 @dataclass(frozen=True)
@@ -416,7 +423,7 @@ def _component_problems(
     try:
         known = vocabulary.of_fmu(Path(fmu)) if isinstance(fmu, str) else _own(kind, section)
     except InputError as error:
-        yield from (Problem(f"{path}.fmu", problem) for problem in error.problems)
+        yield from (Problem(f"{path}.{'fmu' if fmu else 'model'}", problem) for problem in error.problems)
         return
     for group, causality in (("parameters", "parameter"), ("inputs", "input")):
         values = section.get(group, {})
@@ -432,11 +439,18 @@ def _component_problems(
 
 
 def _own(kind: str, section: Document) -> dict[str, vocabulary.Variable]:
-    """Return the variables of our own module; a general graph has none (its missing `fmu` is reported)."""
-    return vocabulary.of_module(kind, section.get("model")) if kind else {}
+    """Return the variables of our own module: a landing's `kind`, or a component's `model`."""
+    if kind:
+        return vocabulary.of_module(kind, section.get("model"))
+    model = section.get("model")
+    if isinstance(model, str) and model not in vocabulary.MODELS:
+        raise InputError(f"no model {model!r}{nearest(model, vocabulary.MODELS)}")
+    return vocabulary.of_module(model) if isinstance(model, str) else {}
 
 
 def _value_problems(path: str, variable: vocabulary.Variable, value: Any) -> Iterator[Problem]:
+    if not isinstance(value, Scalar):
+        return  # the types have said so
     wanted = {"real": (int, float), "integer": int, "boolean": bool, "string": str}[variable.kind]
     is_bool = isinstance(value, bool)
     if not isinstance(value, wanted) or is_bool != (variable.kind == "boolean"):
@@ -469,12 +483,22 @@ def _choice_problems(document: Document) -> Iterator[Problem]:
     masters = vocabulary.masters()
     if isinstance(name, str) and name not in masters:
         yield Problem("simulation.master", f"no master {name!r}{nearest(name, masters)}")
-    for key in options if name in masters else ():
+    for key, value in options.items() if name in masters else ():
         if key not in masters[name]:
             yield Problem(f"master.{key}", f"unknown key for master {name}{nearest(key, masters[name])}")
+        elif not _is_like(value, masters[name][key]):
+            wanted = type(masters[name][key]).__name__
+            yield Problem(f"master.{key}", f"{value!r} is not of type {wanted}")
     robots = vocabulary.robots()
     if isinstance(model, str) and model not in robots:
         yield Problem("robot.model", f"no robot {model!r} in the catalogue{nearest(model, robots)}")
+
+
+def _is_like(value: Any, default: Any) -> bool:
+    """Whether `value` is of the type of `default`; a whole number may stand for a real one."""
+    if isinstance(default, float):
+        return _is_number(value)
+    return type(value) is type(default) or default is None
 
 
 def _step_problems(document: Document) -> Iterator[Problem]:
@@ -498,7 +522,7 @@ def _position_problems(document: Document) -> Iterator[Problem]:
     span = _table(_table(document, "cable"), "parameters").get("span")
     if span is None and "fmu" not in _table(document, "cable"):
         span = vocabulary.of_module("cable")["span"].start
-    if _is_number(position) and _is_number(span) and not 0 < position < span:
+    if _is_number(position) and _is_number(span) and 0 < span < float("inf") and not 0 < position < span:
         yield Problem("landing.position", f"{position:g} m is off the span; it must lie within 0 … {span:g} m")
 
 
@@ -515,4 +539,4 @@ def _worded(problems: list[Problem], file: Path, replaced: list[str]) -> Iterato
 
 
 def _related(path: str, key: str) -> bool:
-    return path != "" and f"{key}.".startswith(f"{path}.")
+    return path != "" and (f"{key}.".startswith(f"{path}.") or path.startswith(f"{key}."))

@@ -19,19 +19,24 @@ from fmpy.fmi1 import FMICallException
 from fmpy.validation import validate_fmu
 
 TESTS = Path(__file__).resolve().parent
-sys.path[:0] = [str(TESTS), str(TESTS / "modules")]
-
-from fmi import Instance  # noqa: E402
+sys.path.insert(0, str(TESTS / "modules"))
 
 from fmus.build import build_fmu, ensure_fmu, ensure_fmus, is_stale, rename_imports  # noqa: E402
 from fmus.model_description import base_unit  # noqa: E402
 from fmus.recipe import FmuRecipe  # noqa: E402
 from fmus.variables import ModuleError  # noqa: E402
+from tests.fmi import Instance  # noqa: E402
 
-RECIPE = FmuRecipe(
-    "oscillator", "oscillator.module:Oscillator", "Damped oscillator", {"n_forces": 2}, {"damping": 0.3}
-)
+RECIPE = FmuRecipe("oscillator", "oscillator.module:Oscillator", "Damped oscillator", {"n_forces": 2}, {"damping": 0.3})
 FATAL, DISCARD = 4, 2
+
+
+@pytest.fixture(scope="module", autouse=True)
+def cache(tmp_path_factory):
+    """Keep the FMUs' copies of their sources out of the user's own folder."""
+    with pytest.MonkeyPatch.context() as patch:
+        patch.setenv("XDG_CACHE_HOME", str(tmp_path_factory.mktemp("cache")))
+        yield
 
 
 @pytest.fixture(scope="module")
@@ -160,9 +165,7 @@ def test_replay_is_bit_identical(folder):
         other.initialize()  # other parameters: they come with the state
         other.fmu.setFMUstate(other.fmu.deSerializeFMUstate(data))
         assert other.run(0.3, 0.05, 5) == first
-        assert other.fmu.serializeFMUstate(other.fmu.getFMUstate()) == one.fmu.serializeFMUstate(
-            one.fmu.getFMUstate()
-        )
+        assert other.fmu.serializeFMUstate(other.fmu.getFMUstate()) == one.fmu.serializeFMUstate(one.fmu.getFMUstate())
         one.fmu.freeFMUstate(state)
 
 
@@ -215,7 +218,7 @@ ERRORS = {
 
 PROBE = """
 import sys
-from fmi import Instance
+from tests.fmi import Instance
 from fmpy.fmi1 import FMICallException
 for line in sys.stdin.read().splitlines():
     with Instance(sys.argv[1]) as one:
@@ -258,7 +261,7 @@ def test_many_instances(folder):
 # --- the build -------------------------------------------------------------------------------------------
 
 
-def run_python(arguments, cwd=None, paths=(TESTS, TESTS / "modules", TESTS.parent), **options):
+def run_python(arguments, cwd=None, paths=(TESTS / "modules", TESTS.parent), **options):
     """Run Python in a process of its own with `paths` to import from."""
     environment = {**os.environ, "PYTHONPATH": os.pathsep.join(map(str, paths))}
     command = [sys.executable, *map(str, arguments)]
@@ -322,10 +325,7 @@ def test_imports_are_renamed():
     source = "from fmus.jit import kernel\nimport numpy as np\n    from fmus import jit\nimport fmusic\n"
     names = {"fmus": "fmus_0"}
     renamed = rename_imports(source.replace("    ", ""), names, Path("x.py"))
-    assert (
-        renamed
-        == "from fmus_0.jit import kernel\nimport numpy as np\nfrom fmus_0 import jit\nimport fmusic\n"
-    )
+    assert renamed == "from fmus_0.jit import kernel\nimport numpy as np\nfrom fmus_0 import jit\nimport fmusic\n"
     with pytest.raises(ModuleError, match=r"x\.py, line 1"):
         rename_imports("import os, fmus.jit\n", names, Path("x.py"))
     with pytest.raises(ModuleError, match=r"x\.py, line 1"):

@@ -2,19 +2,12 @@
 
 from __future__ import annotations
 
-import sys
-from pathlib import Path
-
 import fmpy
 import pytest
 from fmpy.validation import validate_fmu
 
-TESTS = Path(__file__).resolve().parent
-sys.path.insert(0, str(TESTS))
-
-from fmi import Instance  # noqa: E402
-
-from fmus.build import build_fmu, recipes  # noqa: E402
+from fmus.build import build_fmu, recipes
+from tests.fmi import Instance
 
 STARTS = {
     "cable": {"port[1].force.z": -50.0, "port[1].s": 80.0},
@@ -36,9 +29,7 @@ def folder(path):
 
 def bits(rows):
     """Return `rows` so that equal means bit-identical."""
-    return [
-        {name: value.hex() if isinstance(value, float) else value for name, value in r.items()} for r in rows
-    ]
+    return [{name: value.hex() if isinstance(value, float) else value for name, value in r.items()} for r in rows]
 
 
 def moved(one, name):

@@ -20,18 +20,20 @@ from fmus.cable.assembly import (
     add_inertia,
     add_load,
     constrain_vector,
+    dot,
     element_work,
     internal_force,
     interpolate,
     iteration_matrix,
+    kinetic_energy,
     locate,
 )
 from fmus.jit import kernel
-from fmus.time_integration import Collocation, GeneralizedAlpha
 
 N_PORTS = 4
-N_SUMS = 2 + N_PORTS
-"""Dissipated energy, length of the last inner step, work done through each port."""
+DISSIPATED, LAST_INNER, LAST_MACRO, WORK = range(4)
+"""Places behind the coordinates in the state; the work done through each port stands last."""
+N_SUMS = WORK + N_PORTS
 MAX_ITERATIONS = 12
 SLOW = 0.25
 """Contraction of an iteration above which the iteration matrix is made anew."""
@@ -66,10 +68,11 @@ class Work(NamedTuple):
     trial: np.ndarray
     first: np.ndarray
     power: np.ndarray
+    means: np.ndarray
 
 
 def make_work(n: int, state_size: int) -> Work:
-    """Return new workspace for n coordinates."""
+    """Return new workspace for n coordinates; generalized-alpha wants `factorise_mass` too."""
     width = 2 * HALF_BANDWIDTH + 1
     return Work(
         element=element_work(),
@@ -94,7 +97,14 @@ def make_work(n: int, state_size: int) -> Work:
         trial=np.zeros(state_size),
         first=np.zeros((N_PORTS, 3)),
         power=np.zeros(2),
+        means=np.zeros((N_PORTS, 6)),
     )
+
+
+def factorise_mass(model: Model, q: np.ndarray, work: Work) -> None:
+    """Put the factors of the mass matrix into the workspace."""
+    iteration_matrix(model, q, np.zeros_like(q), 1.0, 0.0, 0.0, work.mass_band, work.real_matrix, work.element)
+    banded.factorise(work.mass_band)
 
 
 def state_size(n: int) -> int:
@@ -144,7 +154,7 @@ def _moment_work(model, q, v, ports, offset, weight, sums, work):
         power = moment[0] * (g[1] * gd[2] - g[2] * gd[1])
         power += moment[1] * (g[2] * gd[0] - g[0] * gd[2])
         power += moment[2] * (g[0] * gd[1] - g[1] * gd[0])
-        sums[2 + k] += weight * power / square
+        sums[WORK + k] += weight * power / square
 
 
 @kernel
@@ -199,7 +209,7 @@ def collocation_step(model, method, state, h, offset, ports, tolerance, fresh, w
     """
     n = model.weight.size
     q0, v0, a, sums = state[:n], state[n : 2 * n], state[2 * n : 4 * n].reshape(2, n), state[4 * n :]
-    ratio = h / sums[1] if sums[1] > 0.0 else 0.0
+    ratio = h / sums[LAST_INNER] if sums[LAST_INNER] > 0.0 else 0.0
     for i in range(n):  # the stage accelerations go on along their line
         slope = (a[1, i] - a[0, i]) / (method.c[1] - method.c[0])
         for j in range(2):
@@ -252,14 +262,14 @@ def collocation_step(model, method, state, h, offset, ports, tolerance, fresh, w
             return NOT_CONVERGED
     for j in range(2):
         weight = h * method.b[j]
-        sums[0] += weight * power[j]
+        sums[DISSIPATED] += weight * power[j]
         _moment_work(model, work.q[j], work.v[j], ports, offset + method.c[j] * h, weight, sums, work)
     for i in range(n):
         a0, a1 = work.a[0, i], work.a[1, i]
         q0[i] += h * (v0[i] + h * (method.bb[0] * a0 + method.bb[1] * a1))
         v0[i] += h * (method.b[0] * a0 + method.b[1] * a1)
         a[0, i], a[1, i] = a0, a1
-    sums[1] = h
+    sums[LAST_INNER] = h
     return OK
 
 
@@ -312,31 +322,25 @@ def generalized_alpha_step(model, method, state, h, offset, ports, tolerance, fr
         previous = change
         if iteration == MAX_ITERATIONS - 1:
             return NOT_CONVERGED
-    sums[0] += h * power
+    sums[DISSIPATED] += h * power
     _moment_work(model, q, v, ports, at, h, sums, work)
     for i in range(n):
         q0[i] += h * (v0[i] + h * ((0.5 - beta) * a[0, i] + beta * a1[i]))
         v0[i] += h * ((1.0 - gamma) * a[0, i] + gamma * a1[i])
         a[1, i] = cm * a1[i] + am * a[0, i]
         a[0, i] = a1[i]
-    sums[1] = h
+    sums[LAST_INNER] = h
     return OK
 
 
 @kernel
 def start_alpha(model, state, ports, offset, work):
-    """Turn what `end_alpha` left in the first row of accelerations into accelerations under the loads of this macro step.
+    """Turn what `end_alpha` left in the first row of accelerations into those under the loads of this macro step.
 
-    Generalized-alpha carries a from step to step, a value at t + (alpha_m - alpha_f) h. Loads that jump between macro
-    steps would leave it behind, an error of first order; what is kept from one to the next is therefore M a less the loads.
+    Generalized-alpha carries a from step to step, a value at t + (alpha_m - alpha_f) h. Loads that jump between
+    macro steps would leave it behind, an error of first order; what is kept is therefore M a less the loads.
     """
     n = model.weight.size
-    if work.mass_band[0, HALF_BANDWIDTH] == 0.0:
-        iteration_matrix(
-            model, state[:n], state[n : 2 * n], 1.0, 0.0, 0.0, work.mass_band, work.real_matrix, work.element
-        )
-        if banded.factorise(work.mass_band) != OK:
-            return NOT_CONVERGED
     _port_loads(model, state[:n], ports, offset, work)
     for i in range(n):
         work.increment[i] = state[2 * n + i] + work.external[i]
@@ -344,7 +348,6 @@ def start_alpha(model, state, ports, offset, work):
     banded.solve(work.mass_band, work.increment)
     for i in range(n):
         state[2 * n + i] = work.increment[i]
-    return OK
 
 
 @kernel
@@ -389,8 +392,8 @@ def macro_step(model, collocation, alpha, use_alpha, state, h, longest, ports, m
             first[k, i] = work.start[k, i]
     inner = h / max(1.0, np.ceil(h / longest - 1e-9))
     lag = alpha.alpha_m - alpha.alpha_f
-    if use_alpha and start_alpha(model, state, ports, lag * inner - 0.5 * h, work) != OK:
-        return NOT_CONVERGED
+    if use_alpha:
+        start_alpha(model, state, ports, lag * inner - 0.5 * h, work)
     halvings, elapsed = 0, 0.0
     fresh = elapsed < h  # true; a constant here would be compiled as a type of its own
     while elapsed < h * (1.0 - 1e-12):
@@ -427,40 +430,14 @@ def macro_step(model, collocation, alpha, use_alpha, state, h, longest, ports, m
             for i in range(12):
                 work.start[k, i] = point[i]
     if use_alpha:
-        end_alpha(model, state, ports, lag * sums[1] + 0.5 * h, work)
+        end_alpha(model, state, ports, lag * sums[LAST_INNER] + 0.5 * h, work)
     for k in range(N_PORTS):
         for i in range(3):
             force, rate = ports[k, 1 + i], ports[k, 7 + i]
             end = work.start[k, i]
-            sums[2 + k] += force * (end - first[k, i]) + rate * h * (0.5 * (first[k, i] + end) - means[k, i])
+            sums[WORK + k] += force * (end - first[k, i]) + rate * h * (0.5 * (first[k, i] + end) - means[k, i])
+    sums[LAST_MACRO] = h
     return OK
-
-
-@kernel
-def reactions(model, method, use_alpha, state, ports, offset, out, work):
-    """Write the forces of the left and the right support on the cable to `out` (2, 3)."""
-    n = model.weight.size
-    if use_alpha:
-        internal_force(model, state[:n], state[n : 2 * n], work.residual[0], work.axial, work.element)
-        for i in range(n):
-            work.residual[0, i] += state[2 * n + i] - model.weight[i]
-    else:
-        for i in range(n):
-            work.a[0, i] = method.end[0] * state[2 * n + i] + method.end[1] * state[3 * n + i]
-        _port_loads(model, state[:n], ports, offset, work)
-        residual(
-            model,
-            state[:n],
-            state[n : 2 * n],
-            work.a[0],
-            work.external,
-            work.residual[0],
-            work.axial,
-            work.element,
-        )
-    for k in range(3):
-        out[0, k] = work.residual[0, k]
-        out[1, k] = work.residual[0, n - 6 + k]
 
 
 @kernel
@@ -473,12 +450,62 @@ def mean_axial_force(model, s, axial, shape):
 
 
 @kernel
-def sample_shape(model, state, axial, shape, rows, point):
-    """Write position and axial force at equally spaced arc lengths to `rows` (m, 4)."""
+def show_ports(model, state, ports, shown, work):
+    """Write position, tangent, velocity and tangent rate of every port to the rows of `shown` (N_PORTS, 19)."""
+    for k in range(N_PORTS):
+        port_motion(model, state, ports[k, 0], work.shape, shown[k, 0:12])
+
+
+@kernel
+def step_and_show(model, collocation, alpha, use_alpha, state, h, longest, ports, shown, out, rows, work):
+    """Make a macro step and write all outputs: `macro_step`, `show_ports` and `diagnose` in one call."""
+    status = macro_step(model, collocation, alpha, use_alpha, state, h, longest, ports, work.means, work)
+    if status != OK:
+        return status
+    show_ports(model, state, ports, shown, work)
+    for k in range(N_PORTS):
+        for i in range(6):
+            shown[k, 12 + i] = work.means[k, i]
+        shown[k, 18] = state[4 * model.weight.size + WORK + k]
+    diagnose(model, collocation, use_alpha, state, ports, out, rows, work)
+    return OK
+
+
+@kernel
+def diagnose(model, method, use_alpha, state, ports, out, rows, work):
+    """Write what is shown of the cable besides its ports.
+
+    Parameters
+    ----------
+    ports : (N_PORTS, 13), the loads of the macro step that has just been made
+    out : (13,), receives tension left, mid, right, kinetic, elastic, gravitational and dissipated energy, force of the left
+        support (3) and of the right one (3) on the cable
+    rows : (m, 4), receives position and axial force at equally spaced arc lengths
+    """
     n = model.weight.size
+    q, v, force = state[:n], state[n : 2 * n], work.residual[0]
+    out[3] = kinetic_energy(model, v, work.element, force)
+    out[4] = internal_force(model, q, v, force, work.axial, work.element)[0]
+    out[5] = -dot(model.weight, q)
+    out[6] = state[4 * n + DISSIPATED]
+    work.external[:] = 0.0
+    if use_alpha:  # M a less the loads is kept, see `end_alpha`
+        for i in range(n):
+            force[i] += state[2 * n + i]
+    else:
+        for i in range(n):
+            work.a[0, i] = method.end[0] * state[2 * n + i] + method.end[1] * state[3 * n + i]
+        add_inertia(model, work.a[0], force, work.element)
+        _port_loads(model, q, ports, 0.5 * state[4 * n + LAST_MACRO], work)
+    for k in range(3):
+        out[7 + k] = force[k] - model.weight[k] - work.external[k]
+        out[10 + k] = force[n - 6 + k] - model.weight[n - 6 + k] - work.external[n - 6 + k]
+    out[0] = np.sqrt(out[7] ** 2 + out[8] ** 2 + out[9] ** 2)
+    out[1] = mean_axial_force(model, 0.5 * model.s[-1], work.axial, work.shape)
+    out[2] = np.sqrt(out[10] ** 2 + out[11] ** 2 + out[12] ** 2)
     for i in range(rows.shape[0]):
         s = model.s[-1] * i / (rows.shape[0] - 1)
-        interpolate(model, state[:n], s, shape, point[0])
+        interpolate(model, q, s, work.shape, work.point[0])
         for k in range(3):
-            rows[i, k] = point[0, k]
-        rows[i, 3] = mean_axial_force(model, s, axial, shape)
+            rows[i, k] = work.point[0, k]
+        rows[i, 3] = mean_axial_force(model, s, work.axial, work.shape)

@@ -93,9 +93,7 @@ class Shape:
 def chord_tension(beam: Beam, chord: float, extra: float = 0.0) -> float:
     """Return the tension of the flat parabola: H/EA = chord/L - 1 + (W/H)²/24, W the weight and `extra` load (Irvine 1981)."""
     w = beam.weight * beam.length + extra
-    return brentq(
-        lambda t: t / beam.ea - (chord / beam.length - 1.0) - (w / t) ** 2 / 24.0, 1e-6 * w, beam.ea + 10 * w
-    )
+    return brentq(lambda t: t / beam.ea - (chord / beam.length - 1.0) - (w / t) ** 2 / 24.0, 1e-6 * w, beam.ea + 10 * w)
 
 
 def equilibrium(
@@ -188,7 +186,9 @@ def cantilever(beam: Beam, force: tuple[float, float], moment: float = 0.0) -> n
         return np.array([stretch * c, stretch * d, float(beam.curvature(u[3], np.array(stretch))), -stretch * shear])
 
     def tip(m: float) -> np.ndarray:
-        return solve_ivp(rates, (0.0, beam.length), [0.0, 0.0, 0.0, m], method="DOP853", rtol=1e-13, atol=1e-13).y[:, -1]
+        return solve_ivp(rates, (0.0, beam.length), [0.0, 0.0, 0.0, m], method="DOP853", rtol=1e-13, atol=1e-13).y[
+            :, -1
+        ]
 
     reach = moment + force[1] * beam.length
     m = root(lambda m: (tip(m[0])[3] - moment) / (beam.ei / beam.length), [0.8 * reach], tol=1e-13).x[0]
