@@ -107,7 +107,7 @@ def overview(path: Path, run: Table, reference: Table | None, panels: Sequence[P
 
 def _signal_panel(axis: Axes, panel: Panel, run: Table, reference: Table | None) -> None:
     if reference is not None:
-        axis.plot(reference["time"], _shown(panel, reference), color="0.6", linewidth=2.6, label="Monolithic")
+        axis.plot(reference["time"], _shown(panel, reference), color="0.6", linewidth=2.6, label="Reference")
     line = (0, (4, 2)) if reference is not None else "-"
     axis.plot(run["time"], _shown(panel, run), color=VERMILION, linewidth=1.1, label="Coupled", linestyle=line)
     axis.set_ylabel(f"{panel.label} [{panel.unit}]")
