@@ -181,13 +181,14 @@ class Group:
     values : (n,) float64; integers and Booleans are cast
     """
 
-    __slots__ = ("fmu", "names", "runs", "values")
+    __slots__ = ("fmu", "names", "ones", "runs", "values")
 
     def __init__(self, fmu: Fmu, names: Sequence[str], values: np.ndarray | None = None):
         self.fmu, self.names = fmu, tuple(names)
         self.values = np.zeros(len(self.names)) if values is None else values
         if self.values.shape != (len(self.names),) or not self.values.flags.c_contiguous:
             raise ValueError(f"{fmu.name}: the buffer must be contiguous and hold {len(self.names)} numbers")
+        self.ones = np.ones(len(self.names))
         ports = [fmu.port(name) for name in names]
         types = dict.fromkeys(p.fmi_type for p in ports)
         picks = {
@@ -219,8 +220,8 @@ class Group:
     def get_finite(self) -> None:
         """Read all; raise `FmuError` if a value is not finite."""
         self.get()
-        total = self.values.dot(self.values)
-        if not total < np.inf:
+        total = self.values.dot(self.ones)
+        if not -np.inf < total < np.inf:
             self._name_not_finite()
 
     def _name_not_finite(self) -> None:
@@ -244,6 +245,7 @@ class Fmu:
     ----------
     ports : the variables by name
     log : messages of the FMU
+    parameters : what `set_parameters` was given
     solves, wall : steps made and the seconds spent in them
     time : s, start of the last step
     busy_since : clock at which the running call began, 0 when none runs
@@ -256,6 +258,7 @@ class Fmu:
         self.ports = {p.name: p for v in self.description.modelVariables for p in _ports(v)}
         self.capabilities = _capabilities(self.description)
         self.log: list[str] = []
+        self.parameters: dict[str, Value] = {}
         self.solves, self.wall, self.time, self.busy_since = 0, 0.0, 0.0, 0.0
         binding = Fmi3 if str(self.description.fmiVersion).startswith("3") else Fmi2
         try:
@@ -293,6 +296,13 @@ class Fmu:
             if port.causality not in ("parameter", "input", "structuralParameter"):
                 raise ValueError(f"{self.name}.{name} is no parameter: its causality is {port.causality}")
             self._set_one(port, value)
+        self.parameters |= values
+
+    def twin(self) -> Fmu:
+        """Return a second instance with the same parameters, not initialised."""
+        twin = Fmu(self.path, self.name)
+        twin.set_parameters(self.parameters)
+        return twin
 
     def _set_one(self, port: Port, value: Value) -> None:
         if (port.kind == "string") != isinstance(value, str):

@@ -9,7 +9,7 @@ from time import perf_counter
 
 import numpy as np
 
-from orchestrator.fmu import TIMEOUT, FmuError
+from orchestrator.fmu import TIMEOUT, FmuError, nearest
 from orchestrator.graph import Graph
 from orchestrator.masters.base import Master, StepReport
 from orchestrator.work import Work
@@ -70,21 +70,23 @@ class Recorder:
     """
 
     def __init__(self, graph: Graph, record: Sequence[str] | None):
-        names = _all_outputs(graph) if record is None else list(record)
-        self.parts, self.signals = [], []
+        self.signals = _all_outputs(graph) if record is None else list(record)
+        owners = [signal.partition(".")[0] for signal in self.signals]
+        self.parts = []
         for component, fmu in graph.components.items():
-            mine = [name.partition(".")[2] for name in names if name.partition(".")[0] == component]
-            if mine:
-                self.parts.append((fmu.group(mine), slice(len(self.signals), len(self.signals) + len(mine))))
-                self.signals += [f"{component}.{name}" for name in mine]
-        missing = set(names) - set(self.signals)
+            places = np.array([i for i, owner in enumerate(owners) if owner == component], dtype=np.intp)
+            if places.size:
+                self.parts.append((fmu.group([self.signals[i].partition(".")[2] for i in places]), places))
+        missing = [s for s, owner in zip(self.signals, owners, strict=True) if owner not in graph.components]
         if missing:
-            raise ValueError(f"cannot record {sorted(missing)[0]}: no such component")
+            raise ValueError(
+                f"cannot record {missing[0]}: no such component{nearest(missing[0], graph.components)}"
+            )
 
     def read(self, row: np.ndarray) -> None:
         """Read all signals into `row` (len(signals),)."""
         for group, places in self.parts:
-            group.get()
+            group.get_finite()
             row[places] = group.values
 
 
@@ -130,8 +132,7 @@ def simulate(
     n = _steps(start, stop, H)
     recorder = Recorder(graph, record)
     time, values = start + H * np.arange(n + 1), np.full((n + 1, len(recorder.signals)), np.nan)
-    name = type(master).__name__
-    log = Log(name, H, recorder.signals, time, values)
+    log = Log(master.NAME, H, recorder.signals, time, values)
     run = _Run(graph, master, recorder, log, on_step)
     if timeout is None:
         run(start, stop)
@@ -169,8 +170,9 @@ class _Run:
 
     def __call__(self, start: float, stop: float) -> None:
         try:
-            self._initialize(start, stop)
-            self._loop()
+            with np.errstate(over="ignore", invalid="ignore"):  # what diverges is found by its values
+                self._initialize(start, stop)
+                self._loop()
         except FmuError as error:
             if not self.abandoned:
                 self.log.error = error

@@ -1,9 +1,9 @@
 """Work done through the interfaces, booked from what is exchanged.
 
 Where a component has an input ``X.force`` and an output ``X.position``, the force that acts in a step is
-F + Ḟ (tau - t - H/2), so that its work is F·Δx + Ḟ·(H/2 (x0 + x1) - H x̄), with x̄ the time mean ``X.position_mean``;
-without it the second term is left out. The same with ``X.moment``, ``X.rotation`` (integral of the angular velocity
-over the step, hence x0 = 0) and ``X.rotation_mean``.
+F + Ḟ (tau - t - H/2), so that its work is F·Δx + Ḟ·(H/2 (x0 + x1) - H x̄), with x̄ the time mean
+``X.position_mean``; without it the second term is left out. The same with ``X.moment``, ``X.rotation``
+(integral of the angular velocity over the step, hence x0 = 0) and ``X.rotation_mean``.
 """
 
 from __future__ import annotations

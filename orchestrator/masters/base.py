@@ -44,10 +44,12 @@ class Master:
 
     Attributes
     ----------
+    NAME : key in `MASTERS`
     TITLE : one line
     IMPLICIT : True if steps are repeated, so that every FMU needs rollback
     """
 
+    NAME: ClassVar[str] = ""
     TITLE: ClassVar[str] = ""
     IMPLICIT: ClassVar[bool] = False
 

@@ -26,6 +26,7 @@ class GaussSeidel(Master):
     extrapolation : degree k, 0, 1 or 2
     """
 
+    NAME: ClassVar[str] = "gauss_seidel"
     TITLE: ClassVar[str] = "explicit, one component after the other, inputs extrapolated"
 
     def __init__(self, graph: Graph, *, extrapolation: int = 0):

@@ -25,6 +25,7 @@ class Jacobi(Master):
     extrapolation : degree k, 0, 1 or 2
     """
 
+    NAME: ClassVar[str] = "jacobi"
     TITLE: ClassVar[str] = "explicit, all components at once, inputs extrapolated"
 
     def __init__(self, graph: Graph, *, extrapolation: int = 0):
@@ -38,20 +39,28 @@ class Jacobi(Master):
 
     def step(self, t: float, H: float) -> StepReport:
         """Advance all components from `t` to `t + H`."""
-        graph = self.graph
-        graph.exchange_discrete()
+        self.graph.exchange_discrete()
         if self.history.order:
-            self.history.append(t, graph.u)
-            extrapolate(graph, self.loads, self.history, t, H)
+            self._extrapolate(t, H)
+        self._step_all(t, H)
+        return StepReport(t + H)
+
+    def _extrapolate(self, t: float, H: float) -> None:
+        self.history.append(t, self.graph.u)
+        extrapolate(self.graph, self.loads, self.history, t, H)
+
+    def _step_all(self, t: float, H: float) -> None:
+        """Step with the inputs that are in the graph, then move the outputs."""
+        graph = self.graph
         for node in graph.nodes:
-            node.inputs.set()
+            if node.inputs.names:
+                node.inputs.set()
             if node.rates.names:
                 node.rates.set()
             node.fmu.step(t, H)
         if graph.observers:
             graph.accepted(t, H)
         graph.refresh()
-        return StepReport(t + H)
 
 
 def extrapolate(graph: Graph, loads: Loads, history: History, t: float, H: float) -> None:

@@ -1,16 +1,126 @@
-"""Small FMUs for the tests, built into a temporary folder."""
+"""Small FMUs for the tests: built once into a temporary folder, and the systems made of them."""
 
 from __future__ import annotations
 
+import atexit
+import tempfile
+from functools import cache
 from pathlib import Path
 
+import numpy as np
 from pythonfmu import FmuBuilder
+from scipy.linalg import expm
+
+from orchestrator.fmu import Fmu
+from orchestrator.graph import Connection, Graph
 
 SCRIPTS = Path(__file__).resolve().parent
 OPTIONS = {"canGetAndSetFMUstate": True, "canSerializeFMUstate": True, "needsExecutionTool": False}
 
 
-def build(script: str, folder: Path, **options: bool) -> Path:
-    """Build one of the scripts of this folder into `folder`; return the FMU."""
-    folder.mkdir(parents=True, exist_ok=True)
-    return Path(FmuBuilder.build_FMU(str(SCRIPTS / script), dest=str(folder), **{**OPTIONS, **options}))
+@cache
+def _folder() -> Path:
+    holder = tempfile.TemporaryDirectory(prefix="test-fmus-")
+    atexit.register(holder.cleanup)
+    return Path(holder.name)
+
+
+@cache
+def build(name: str, *, rollback: bool = True) -> Path:
+    """Build ``NAME_fmu.py`` of this folder, once a process; return the FMU."""
+    folder = _folder() / ("" if rollback else "no_rollback")
+    folder.mkdir(exist_ok=True)
+    options = {**OPTIONS, "canGetAndSetFMUstate": rollback, "canSerializeFMUstate": rollback}
+    return Path(FmuBuilder.build_FMU(str(SCRIPTS / f"{name}_fmu.py"), dest=str(folder), **options))
+
+
+def fmu(kind: str, name: str, *, rollback: bool = True, **parameters: float | int | str) -> Fmu:
+    """Return an instance of a test FMU with parameters set."""
+    instance = Fmu(build(kind, rollback=rollback), name)
+    instance.set_parameters(parameters)
+    return instance
+
+
+MILD = {"stiffness": 100.0, "damping": 1.0, "ground": 1000.0, "start": (0.1, 0.0)}
+STIFF = {"stiffness": 1e6, "damping": 1.0, "ground": 1000.0, "start": (0.1, 0.1)}
+MASS, GROUND, GROUND_DAMPING = 10.0, 10.0, 1.0
+
+
+def oscillator(
+    stiffness: float,
+    damping: float,
+    ground: float,
+    start: tuple[float, float],
+    *,
+    waveform: bool = False,
+    rollback: bool = True,
+) -> Graph:
+    """Return two masses on springs to ground, coupled by a spring that belongs to the second one
+    (force-displacement)."""
+    a = fmu("link", "a", rollback=rollback, mass=MASS, ground_stiffness=GROUND, initial_position=start[0])
+    b = fmu(
+        "link",
+        "b",
+        mass=MASS,
+        ground_stiffness=ground,
+        ground_damping=GROUND_DAMPING,
+        stiffness=stiffness,
+        damping=damping,
+        initial_position=start[1],
+        waveform=float(waveform),
+    )
+    pairs = [("a.position", "b.left.position"), ("b.left.force", "a.force")]
+    if waveform:
+        pairs += [("a.position_mean", "b.left.position_mean"), ("b.left.force_rate", "a.force_rate")]
+    else:
+        pairs += [("a.velocity", "b.left.velocity")]
+    return Graph({"a": a, "b": b}, [Connection(*pair) for pair in pairs])
+
+
+def oscillator_solution(
+    time: np.ndarray, stiffness: float, damping: float, ground: float, start: tuple[float, float]
+) -> np.ndarray:
+    """Return both positions, (len(time), 2), from the matrix exponential."""
+    A = np.zeros((4, 4))
+    A[0, 1] = A[2, 3] = 1.0
+    A[1] = np.array([-(GROUND + stiffness), -damping, stiffness, damping]) / MASS
+    A[3] = np.array([stiffness, damping, -(ground + stiffness), -(GROUND_DAMPING + damping)]) / MASS
+    z0 = np.array([start[0], 0.0, start[1], 0.0])
+    return np.array([(expm(A * t) @ z0)[[0, 2]] for t in time])
+
+
+def chain(n: int, *, waveform: bool, stiffness: float = 200.0) -> Graph:
+    """Return `n` equal masses, each coupled to its left neighbour by a spring; the first one starts
+    displaced."""
+    components, connections = {}, []
+    for i in range(n):
+        components[f"m{i}"] = fmu(
+            "link",
+            f"m{i}",
+            mass=1.0,
+            ground_stiffness=10.0,
+            stiffness=stiffness if i else 0.0,
+            initial_position=0.0 if i else 0.1,
+            waveform=float(waveform),
+        )
+    for i in range(1, n):
+        left, right = f"m{i - 1}", f"m{i}"
+        connections += [Connection(f"{left}.position", f"{right}.left.position")]
+        connections += [Connection(f"{right}.left.force", f"{left}.force")]
+        if waveform:
+            connections += [Connection(f"{left}.position_mean", f"{right}.left.position_mean")]
+            connections += [Connection(f"{right}.left.force_rate", f"{left}.force_rate")]
+        else:
+            connections += [Connection(f"{left}.velocity", f"{right}.left.velocity")]
+    return Graph(components, connections)
+
+
+def chain_solution(time: np.ndarray, n: int, stiffness: float = 200.0) -> np.ndarray:
+    """Return the positions of the chain, (len(time), n), from the matrix exponential."""
+    K = 10.0 * np.eye(n)
+    for i in range(1, n):
+        K[i - 1 : i + 1, i - 1 : i + 1] += stiffness * np.array([[1.0, -1.0], [-1.0, 1.0]])
+    A = np.block([[np.zeros((n, n)), np.eye(n)], [-K, np.zeros((n, n))]])
+    z0 = np.zeros(2 * n)
+    z0[0] = 0.1
+    return np.array([(expm(A * t) @ z0)[:n] for t in time])

@@ -2,7 +2,10 @@
 step.
 
 m x'' = -k0 x - c0 x' - f + F, with f = k (x - x_left) + c (x' - v_left) the force on the left neighbour and
-F = force + force_rate (tau - t - h/2). `left.position` and `left.velocity` are held during a step.
+F = force + force_rate (tau - t - h/2). With waveform = 0 `left.position` and `left.velocity` are held during
+a step and `left.force` is f at its end; with waveform = 1 the left neighbour moves on the quadratic through
+the start, the end and the mean of its position, and `left.force`, `left.force_rate` are the mean and the
+slope of f.
 """
 
 import pickle
@@ -11,21 +14,39 @@ import numpy as np
 from pythonfmu import Fmi2Causality, Fmi2Slave, Fmi2Variability, Real
 from scipy.linalg import expm
 
-PARAMETERS = [
-    "mass",
-    "ground_stiffness",
-    "ground_damping",
-    "stiffness",
-    "damping",
-    "initial_position",
-    "initial_velocity",
-]
-INPUTS = ["left.position", "left.velocity", "force", "force_rate"]
-OUTPUTS = ["position", "velocity", "position_mean", "left.force"]
+PARAMETERS = ["mass", "ground_stiffness", "ground_damping", "stiffness", "damping"]
+PARAMETERS += ["initial_position", "initial_velocity", "waveform"]
+INPUTS = ["left.position", "left.velocity", "force", "force_rate", "left.position_mean"]
+OUTPUTS = ["position", "velocity", "position_mean", "left.force", "left.force_rate"]
 NAMES = PARAMETERS + INPUTS + OUTPUTS
-UNITS = ["kg", "N/m", "N.s/m", "N/m", "N.s/m", "m", "m/s", "m", "m/s", "N", "N/s", "m", "m/s", "m", "N"]
+UNITS = [
+    "kg",
+    "N/m",
+    "N.s/m",
+    "N/m",
+    "N.s/m",
+    "m",
+    "m/s",
+    "1",
+    "m",
+    "m/s",
+    "N",
+    "N/s",
+    "m",
+    "m",
+    "m/s",
+    "m",
+    "N",
+    "N/s",
+]
+M, K0, C0, K, C, X0, V0, WAVEFORM, XL, VL, F, FR, XLM, X, V, XM, LF, LFR = range(len(NAMES))
 BASE = {"kg": {"kg": 1}, "N/m": {"kg": 1, "s": -2}, "N.s/m": {"kg": 1, "s": -1}, "m": {"m": 1}}
-BASE |= {"m/s": {"m": 1, "s": -1}, "N": {"kg": 1, "m": 1, "s": -2}, "N/s": {"kg": 1, "m": 1, "s": -3}}
+BASE |= {
+    "1": {},
+    "m/s": {"m": 1, "s": -1},
+    "N": {"kg": 1, "m": 1, "s": -2},
+    "N/s": {"kg": 1, "m": 1, "s": -3},
+}
 
 
 class LinkTest(Fmi2Slave):
@@ -35,6 +56,7 @@ class LinkTest(Fmi2Slave):
         super().__init__(**kwargs)
         self.values = [1.0] + [0.0] * (len(NAMES) - 1)
         self.cache = {}
+        self.left = 0.0
         for i, name in enumerate(NAMES):
             kind = "parameter" if name in PARAMETERS else "input" if name in INPUTS else "output"
             variability = Fmi2Variability.fixed if kind == "parameter" else Fmi2Variability.continuous
@@ -63,7 +85,7 @@ class LinkTest(Fmi2Slave):
         return root
 
     def get_real(self, vrs):
-        if NAMES.index("left.force") in vrs:
+        if LF in vrs and not self.values[WAVEFORM]:
             self._reaction()
         return [self.values[i] for i in vrs]
 
@@ -72,40 +94,56 @@ class LinkTest(Fmi2Slave):
             self.values[i] = value
 
     def _reaction(self):
-        _, _, _, k, c, _, _, xl, vl, _, _, x, v, _, _ = self.values
-        self.values[14] = k * (x - xl) + c * (v - vl)
-
-    def exit_initialization_mode(self):
-        pass
+        v = self.values
+        v[LF] = v[K] * (v[X] - v[XL]) + v[C] * (v[V] - v[VL])
 
     def enter_initialization_mode(self):
-        self.values[11], self.values[12] = self.values[5], self.values[6]
-        self.values[13] = self.values[11]
+        v = self.values
+        v[X], v[V], v[XM] = v[X0], v[V0], v[X0]
+
+    def exit_initialization_mode(self):
+        self._reaction()
+        self.left = self.values[XL]
 
     def _matrix(self, h):
-        """exp(h A) for the state (integral of x, x, v, F, dF/dt, 1), which holds the inputs too."""
+        """exp(h A) for the state (iint f, int f, int x, x, v, F, dF/dt, left position and its two
+        derivatives)."""
         m, k0, c0, k, c = self.values[:5]
         key = (h, m, k0, c0, k, c)
         if key not in self.cache:
-            A = np.zeros((6, 6))
-            A[0, 1] = A[1, 2] = A[3, 4] = 1.0
-            A[2, 1], A[2, 2], A[2, 3], A[2, 5] = -(k0 + k) / m, -(c0 + c) / m, 1.0 / m, 1.0 / m
+            A = np.zeros((10, 10))
+            A[0, 1] = A[2, 3] = A[3, 4] = A[5, 6] = A[7, 8] = A[8, 9] = 1.0
+            A[1, [3, 4, 7, 8]] = k, c, -k, -c
+            A[4] = -A[1] / m
+            A[4, [3, 4]] -= k0 / m, c0 / m
+            A[4, 5] = 1.0 / m
             self.cache[key] = expm(h * A)
         return self.cache[key]
 
     def do_step(self, current_time, step_size):
         h, v = step_size, self.values
-        pull = v[3] * v[7] + v[4] * v[8]
-        start = np.array([0.0, v[11], v[12], v[9] - v[10] * h / 2, v[10], pull])
+        start = np.array([0.0, 0.0, 0.0, v[X], v[V], v[F] - v[FR] * h / 2, v[FR], *self._left_motion(h)])
         end = self._matrix(h) @ start
-        v[13], v[11], v[12] = end[0] / h, end[1], end[2]
+        v[XM], v[X], v[V] = end[2] / h, end[3], end[4]
+        if v[WAVEFORM]:
+            v[LF], v[LFR] = end[1] / h, 12 / h**3 * (h / 2 * end[1] - end[0])
+            self.left = v[XL]
         return True
 
+    def _left_motion(self, h):
+        """Position, velocity and acceleration of the left neighbour at the start of the step."""
+        v = self.values
+        if not v[WAVEFORM]:
+            return v[XL] + (v[C] / v[K] if v[K] else 0.0) * v[VL], 0.0, 0.0
+        b = 6 * ((self.left + v[XL]) / 2 - v[XLM])
+        a = v[XL] - self.left - b
+        return self.left, a / h, 2 * b / h**2
+
     def _get_fmu_state(self):
-        return list(self.values)
+        return (list(self.values), self.left)
 
     def _set_fmu_state(self, state):
-        self.values = list(state)
+        self.values, self.left = list(state[0]), state[1]
 
     @staticmethod
     def _fmu_state_to_bytes(state):

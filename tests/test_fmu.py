@@ -1,0 +1,220 @@
+"""One FMU behind its buffers: loading, types, states, messages, failures."""
+
+from __future__ import annotations
+
+import shutil
+import subprocess
+import sys
+import zipfile
+
+import numpy as np
+import pytest
+
+from orchestrator.fmu import NOT_FINITE, TIMEOUT, Fmu, FmuError, suffixed, unzip_folder
+from orchestrator.graph import Graph
+from orchestrator.masters import MASTERS
+from orchestrator.simulation import simulate
+from tests.fmus import build, fmu
+
+
+@pytest.fixture
+def odd():
+    instance = fmu("odd", "odd", gain=2.0, note="100% %s %n")
+    yield instance
+    instance.close()
+
+
+def started(instance: Fmu) -> Fmu:
+    instance.enter_initialization(0.0)
+    instance.exit_initialization()
+    return instance
+
+
+def test_ports_carry_what_the_description_says(odd):
+    assert (odd.ports["u"].unit, odd.ports["u"].kind, odd.ports["u"].causality) == ("m", "real", "input")
+    assert odd.ports["held_in"].variability == "discrete"
+    assert {odd.ports[n].kind for n in ("count", "flag", "note")} == {"integer", "boolean", "string"}
+    assert odd.capabilities.rollback
+    assert not fmu("odd", "stuck", rollback=False).capabilities.rollback
+
+
+def test_group_of_all_types(odd):
+    """u = 3 m held for 0.5 s: x = 1.5, y = 2 * 3000 mm; one step counted."""
+    started(odd)
+    inputs = odd.group(["u", "count_in", "flag_in"])
+    inputs.values[:] = 3.0, 7.0, 1.0
+    inputs.set()
+    odd.step(0.0, 0.5)
+    outputs = odd.group(["x", "y", "count", "flag", "count_in", "flag_in"])
+    outputs.get()
+    assert outputs.values.tolist() == [1.5, 6000.0, 1.0, 1.0, 7.0, 1.0]
+    assert odd.read("note") == "100% %s %n"
+    assert odd.read("flag") is True
+
+
+def test_group_uses_a_given_buffer(odd):
+    buffer = np.zeros(4)
+    group = started(odd).group(["u", "x"], buffer[1:3])
+    group.values[:] = 2.0, 0.0
+    odd.group(["u"], buffer[1:2]).set()
+    group.get()
+    assert buffer.tolist() == [0.0, 2.0, 0.0, 0.0]
+    with pytest.raises(ValueError, match="must be contiguous"):
+        odd.group(["u", "x"], buffer[::2])
+    with pytest.raises(ValueError, match="note is a string"):
+        odd.group(["u", "note"])
+
+
+def test_replay_is_bit_identical(odd):
+    started(odd)
+    u, x = odd.group(["u"]), odd.group(["x", "count"])
+    u.values[0] = 0.1
+    u.set()
+    odd.step(0.0, 0.3)
+    state = odd.save()
+    outcomes = []
+    for _ in range(3):
+        odd.step(0.3, 0.7)
+        x.get()
+        outcomes.append(x.values.tolist())
+        odd.restore(state)
+    odd.release(state)
+    assert outcomes[0] == outcomes[1] == outcomes[2]
+
+
+def test_instances_are_independent():
+    a, b = started(fmu("odd", "a", initial=1.0)), started(fmu("odd", "b", initial=2.0))
+    assert (a.read("x"), b.read("x")) == (1.0, 2.0)
+    a.close()
+    assert b.read("x") == 2.0
+    b.close()
+    b.close()
+
+
+WRONG = [
+    ({"gian": 1.0}, "no variable gian; did you mean gain"),
+    ({"y": 1.0}, "y is no parameter"),
+    ({"note": 1.0}, "of type string"),
+    ({"gain": "one"}, "of type real"),
+    ({"fault": 1.5}, "of type integer"),
+]
+
+
+@pytest.mark.parametrize(("parameters", "message"), WRONG)
+def test_wrong_parameters(odd, parameters, message):
+    with pytest.raises(ValueError, match=message):
+        odd.set_parameters(parameters)
+
+
+def test_files_that_are_no_fmu(tmp_path):
+    text, archive = tmp_path / "a.fmu", tmp_path / "b.fmu"
+    text.write_text("no archive")
+    with zipfile.ZipFile(archive, "w") as file:
+        file.writestr("readme.txt", "nothing")
+    for path in (text, archive):
+        with pytest.raises(ValueError, match="not an FMU"):
+            Fmu(path)
+    with pytest.raises(ValueError, match="no such file"):
+        Fmu(tmp_path / "missing.fmu")
+
+
+def test_fmu_without_a_binary_for_this_machine(tmp_path):
+    empty = tmp_path / "empty.fmu"
+    with zipfile.ZipFile(build("odd")) as source, zipfile.ZipFile(empty, "w") as target:
+        for name in source.namelist():
+            if not name.startswith("binaries"):
+                target.writestr(name, source.read(name))
+    with pytest.raises(ValueError, match="cannot be loaded: Cannot find shared library"):
+        Fmu(empty)
+
+
+def test_awkward_path(tmp_path):
+    """Loaders crash on such names; the FMU is unzipped elsewhere, and once only."""
+    folder = tmp_path / "Größe + #1 Ω"
+    folder.mkdir()
+    path = shutil.copy(build("odd"), folder / "öd.fmu")
+    instance = started(Fmu(path))
+    assert str(unzip_folder(instance.sha256)).isascii()
+    assert instance.sha256 == fmu("odd", "same").sha256
+    instance.close()
+
+
+def test_messages_are_collected_with_their_percent_signs():
+    instance = started(fmu("odd", "odd", fault=5))
+    instance.step(0.0, 0.1)
+    assert instance.log == ["[warning] all of 100%s%n"]
+    instance.close()
+
+
+def test_discard_carries_the_fmus_own_words():
+    instance = started(fmu("odd", "odd", fault=1, longest_step=0.01))
+    instance.step(0.0, 0.01)
+    with pytest.raises(FmuError, match=r"discard; the FMU says: .*100% too long") as caught:
+        instance.step(0.01, 0.1)
+    assert (caught.value.component, caught.value.time, caught.value.status) == ("odd", 0.01, 2)
+    instance.close()
+
+
+def test_not_a_number_is_found():
+    instance = started(fmu("odd", "odd", fault=2))
+    instance.step(0.0, 0.1)
+    with pytest.raises(FmuError, match="output x is not a finite number") as caught:
+        instance.group(["y", "x"]).get_finite()
+    assert caught.value.status == NOT_FINITE
+    instance.close()
+
+
+def test_large_numbers_are_no_error(odd):
+    group = started(odd).group(["u"])
+    group.values[0] = 1e200
+    group.set()
+    group.get_finite()
+
+
+def test_hang_in_a_process_of_its_own():
+    """An FMU that sleeps for a minute: the run comes back within the time-out, and the process ends with
+    status 3."""
+    code = (
+        "import os\n"
+        "from orchestrator.graph import Graph\n"
+        "from orchestrator.masters import MASTERS\n"
+        "from orchestrator.simulation import simulate\n"
+        "from tests.fmus import fmu\n"
+        "graph = Graph({'a': fmu('odd', 'a', fault=3, fault_time=0.1)}, [])\n"
+        "log = simulate(graph, MASTERS['jacobi'](graph), 0.0, 1.0, 0.05, timeout=1.0)\n"
+        "print(log.error, '|', log.error.status, len(log.time), flush=True)\n"
+        "os._exit(3)\n"
+    )
+    done = subprocess.run([sys.executable, "-c", code], capture_output=True, text=True, timeout=40)
+    assert done.returncode == 3, done.stderr
+    assert "no answer within 1 s" in done.stdout
+    assert done.stdout.split("|")[1].split() == [str(TIMEOUT), "3"]
+
+
+def test_all_outputs_are_recorded_by_default():
+    graph = Graph({"a": fmu("odd", "a", initial=1.0)}, [])
+    log = simulate(graph, MASTERS["jacobi"](graph), 0.0, 0.2, 0.1)
+    graph.close()
+    assert log.signals == [f"a.{n}" for n in ("y", "x", "angle", "held_out", "count", "flag")]
+    assert log.signal("a.count").tolist() == [0.0, 1.0, 2.0]
+    assert log.solves == {"a": 1}
+
+
+def test_unknown_signal_is_named():
+    graph = Graph({"a": fmu("odd", "a")}, [])
+    with pytest.raises(ValueError, match="no variable z"):
+        simulate(graph, MASTERS["jacobi"](graph), 0.0, 0.2, 0.1, record=["a.z"])
+    with pytest.raises(ValueError, match=r"cannot record b\.x"):
+        simulate(graph, MASTERS["jacobi"](graph), 0.0, 0.2, 0.1, record=["b.x"])
+    graph.close()
+
+
+def test_process_ends_cleanly():
+    """Without the end of the interpreters in the libraries the process may abort on its way out."""
+    code = "from tests.fmus import fmu; fmu('odd', 'a').enter_initialization(0.0)"
+    assert subprocess.run([sys.executable, "-c", code], timeout=40).returncode == 0
+
+
+def test_suffix_goes_before_the_axis():
+    assert suffixed("port[1].force.x", "_rate") == "port[1].force_rate.x"
+    assert suffixed("force", "_mean") == "force_mean"
