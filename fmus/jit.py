@@ -43,5 +43,6 @@ def _cache_folder() -> Path:
 
 numba.config.CACHE_DIR = str(_cache_folder())  # type: ignore[attr-defined]
 
-kernel = numba.njit(cache=True, error_model="numpy")
-"""Decorator of every kernel."""
+kernel = numba.njit(cache=True, error_model="numpy", _nrt=False)
+"""Decorator of every kernel. Without Numba's run time (reference counts) nothing can be allocated: such code does not
+compile. It also compiles a fifth faster, and the compiled code is shorter."""
