@@ -6,6 +6,7 @@ Exit status: 0 done and within tolerance; 1 done, but a tolerance or a safety li
 
 from __future__ import annotations
 
+import os
 import sys
 from collections.abc import Callable, Iterator
 from contextlib import contextmanager
@@ -254,12 +255,15 @@ def _items(text: str | None) -> list[str]:
 
 
 def _free(out: Path | None, name: str) -> Path:
-    """Return the directory to be made; `InputError`, before anything is run, if it exists."""
+    """Return the directory to be made; `InputError`, before anything is run, if it exists or cannot be made."""
     from orchestrator.results import default_directory
 
     path = out or default_directory(name)
     if path.exists():
         raise InputError(f"{path}: exists already; remove it or choose another with --out")
+    parent = next(p for p in path.absolute().parents if p.exists())
+    if not (parent.is_dir() and os.access(parent, os.W_OK)):
+        raise InputError(f"{path}: cannot be made, {parent} is no folder to write to; choose another with --out")
     return path
 
 
