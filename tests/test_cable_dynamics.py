@@ -133,7 +133,13 @@ def test_moment_at_a_port_turns_the_cable():
     """A couple M at midspan of a hinged beam turns it there by M L/(12 EI) (Roark), for small angles."""
     made = cable(
         {"span": 2.0, "unstretched_length": 2.0, "gravity": 0.0, "linear_density": 0.1, "bending_stiffness": 100.0},
-        {"axial_stiffness": 1e6, "damping_time": 0.05, "spectral_radius": 0.0, "integration_step": 0.05, "n_elements": 10},
+        {
+            "axial_stiffness": 1e6,
+            "damping_time": 0.05,
+            "spectral_radius": 0.0,
+            "integration_step": 0.05,
+            "n_elements": 10,
+        },
     )
     made.table.assign(made.values, {"port[1].s": 1.0, "port[1].moment.x": 0.1})
     for k in range(40):

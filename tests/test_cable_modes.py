@@ -43,7 +43,9 @@ def test_clamped_beam_without_tension():
     """cos βL cosh βL = 1 (Euler–Bernoulli, clamped at both ends): βL = 4.730041, 7.853205, 10.995608."""
     settings = RIG | {"gravity": 0.0, "clamped": True, "n_elements": 40}
     found = modes(cable(settings), 3)
-    expected = np.array([4.730040745, 7.853204624, 10.995607838]) ** 2 * np.sqrt(337.8 / 0.707) / 10.0**2 / (2.0 * np.pi)
+    expected = (
+        np.array([4.730040745, 7.853204624, 10.995607838]) ** 2 * np.sqrt(337.8 / 0.707) / 10.0**2 / (2.0 * np.pi)
+    )
     assert found.out_of_plane.frequency == pytest.approx(expected, rel=1e-5)
     assert found.in_plane.frequency == pytest.approx(expected, rel=1e-5)
 

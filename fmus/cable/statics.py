@@ -52,9 +52,9 @@ def mesh_model(
 def catenary(model: Model, span: float, level_difference: float) -> np.ndarray:
     """Return nodal coordinates (n,) on the elastic catenary between the supports: no bending stiffness.
 
-    Irvine, Cable Structures, 1981, section 1.3: with the horizontal tension H and the vertical tension V at the left end,
-    y(s) = H s/EA + H/w (asinh(V/H) - asinh((V - w s)/H)), and likewise z(s). Strains here are engineering strains.
-    A weightless or taut cable tends to the straight line, on which the unknown V is found for a given H.
+    Irvine, Cable Structures, 1981, section 1.3: with the horizontal tension H and the vertical tension V at the
+    left end, y(s) = H s/EA + H/w (asinh(V/H) - asinh((V - w s)/H)), and likewise z(s). Strains here are engineering
+    strains. A weightless or taut cable tends to the straight line, on which the unknown V is found for a given H.
     """
     length, w = model.s[-1], model.density * model.gravity
     chord = np.hypot(span, level_difference)
@@ -109,9 +109,10 @@ def _on_line(model: Model, span: float, level_difference: float) -> np.ndarray:
 def equilibrium(model: Model, span: float, level_difference: float, load: np.ndarray | None = None) -> np.ndarray:
     """Return the coordinates (n,) in static equilibrium under gravity and `load`.
 
-    The potential energy is minimised by Newton's method from the catenary: each step is shortened until the energy falls, and
-    the matrix is shifted by a multiple of the mass matrix as long as it is not positive definite. Should that fail (a slack
-    cable in clamps, whose bending layer is shorter than an element), the bending stiffness is lowered to its value in steps.
+    The potential energy is minimised by Newton's method from the catenary: each step is shortened until the energy
+    falls, and the matrix is shifted by a multiple of the mass matrix as long as it is not positive definite. Should
+    that fail (a slack cable in clamps, whose bending layer is shorter than an element), the bending stiffness is
+    lowered to its value in steps.
 
     Parameters
     ----------
@@ -136,8 +137,8 @@ def equilibrium(model: Model, span: float, level_difference: float, load: np.nda
 def _cure(model: Model) -> str:
     """Return what to do about a missing equilibrium.
 
-    In clamps, elements much longer than the bending layer √(EI/T) cannot follow it: a slack cable then buckles there, on paper
-    only, and the equilibrium in the vertical plane is not a minimum of the energy.
+    In clamps, elements much longer than the bending layer √(EI/T) cannot follow it: a slack cable then buckles
+    there, on paper only, and the equilibrium in the vertical plane is not a minimum of the energy.
     """
     weight = model.density * model.gravity * model.s[-1]
     if weight == 0.0:

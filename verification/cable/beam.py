@@ -1,7 +1,7 @@
 """Independent statics and small vibrations of a beam-cable in a vertical plane: no element, no code of `fmus`.
 
-The centreline r(s) has stretch λ and inclination θ: r' = λ (cos θ, sin θ). Energy per unstretched length is, with the
-strain measure of the project (Green–Lagrange) or engineering strain,
+The centreline r(s) has stretch λ and inclination θ: r' = λ (cos θ, sin θ). Energy per unstretched length is, with
+the strain measure of the project (Green–Lagrange) or engineering strain,
 
     W = EA/2 ((λ² - 1)/2)² + EI/2 (λ² θ')²      or      W = EA/2 (λ - 1)² + EI/2 θ'².
 

@@ -1,10 +1,10 @@
 """Sag, support force and slope of the cable at rest, beside an independent boundary-value solution.
 
 The reference (`verification/cable/beam.py`) is the extensible beam-cable as a boundary-value problem, solved by
-`scipy.integrate.solve_bvp` to a relative residual of 1e-9; it shares no code with the element. Dead loads of 38 kg stand at
-midspan or at a tenth of the span. Where the mesh is converged (120 elements graded 1:100) everything must agree within 1e-5;
-the recommended mesh (30 elements graded 1:30, refined where the load stands) must within 1e-3 under a point load and
-within 1e-4 without one.
+`scipy.integrate.solve_bvp` to a relative residual of 1e-9; it shares no code with the element. Dead loads of 38 kg
+stand at midspan or at a tenth of the span. Where the mesh is converged (120 elements graded 1:100) everything must
+agree within 1e-5; the recommended mesh (30 elements graded 1:30, refined where the load stands) must within 1e-3
+under a point load and within 1e-4 without one.
 """
 
 from __future__ import annotations
@@ -183,7 +183,8 @@ def run(figures: Path) -> Result:
         found,
         [("cable_statics.png", caption)],
         """Green–Lagrange strain makes the cable stiffer in tension by 3/2 of the strain: the sag is 0.27 mm smaller than for
-        engineering strain. Equal elements of 10 m do not see the bending layer √(EI/H) = 0.55 m: 1 % off in clamps, and
+        engineering strain. Equal elements of 10 m do not see the bending layer √(EI/H) = 0.55 m: 1 % off in clamps,
+        and
         0.2–0.6 % under a point load; graded meshes do.""",
     )
 
