@@ -139,7 +139,7 @@ class Implicit(Master):
         self._advance(t + H / 2, H / 2, depth + 1, report)
 
     def _accept(self, t: float, H: float) -> None:
-        self.predictor.append(t + H / 2, self.x)
+        self.predictor.append(t + H / 2, self.x, self.scale.values)
         if self.graph.observers:
             self.graph.accepted(t, H)
         self.graph.gather()
