@@ -7,8 +7,9 @@ iteration of a macro step.
 
 from __future__ import annotations
 
-from collections.abc import Callable, Iterable, Mapping, Sequence
+from collections.abc import Iterable, Mapping, Sequence
 from dataclasses import dataclass, field
+from typing import Any, Protocol
 
 import numpy as np
 from fmpy.model_description import Unit
@@ -32,6 +33,19 @@ class Connection:
 
     source: str
     target: str
+
+
+class Observer(Protocol):
+    """Is told of every accepted step, and can go back when the step is rolled back after all."""
+
+    def __call__(self, t: float, h: float) -> None:
+        """All components went from `t` to `t + h`; the inputs of that step are still in `Graph.u`."""
+
+    def save(self) -> Any:
+        """Return what `restore` needs."""
+
+    def restore(self, saved: Any) -> None:
+        """Go back to what was saved."""
 
 
 @dataclass
@@ -66,7 +80,7 @@ class Node:
 
     def receive(self, y: np.ndarray) -> None:
         """Take the inputs that are not torn from the outputs `y`."""
-        np.take(y, self.forward, out=self.forward_values, mode="clip")
+        y.take(self.forward, out=self.forward_values, mode="clip")
         if self.gain is not None and self.offset is not None:
             np.multiply(self.forward_values, self.gain, out=self.forward_values)
             np.add(self.forward_values, self.offset, out=self.forward_values)
@@ -104,14 +118,13 @@ class Graph:
     torn : (n_t,) places in `u` that are fed by a component later in the order (or itself): the unknowns of
         implicit masters
     nodes : the components in Gauss–Seidel order
-    observers : called as f(t, h) after every accepted step of all components, inputs of that step still in
-        `u`
+    observers : are told of every accepted step
     """
 
     components: Mapping[str, Fmu]
     connections: Iterable[Connection]
     order: Sequence[str] | None = None
-    observers: list[Callable[[float, float], None]] = field(default_factory=list)
+    observers: list[Observer] = field(default_factory=list)
 
     def __post_init__(self) -> None:
         self.components = dict(self.components)
@@ -211,7 +224,7 @@ class Graph:
 
     def gather(self) -> None:
         """Move all continuous outputs to the inputs: u from y."""
-        np.take(self.y, self.source, out=self.u, mode="clip")
+        self.y.take(self.source, out=self.u, mode="clip")
         if self.gain is not None and self.offset is not None:
             np.multiply(self.u, self.gain, out=self.u)
             np.add(self.u, self.offset, out=self.u)
@@ -231,7 +244,7 @@ class Graph:
             return
         for node in self.discrete:
             node.discrete_outputs.get_finite()
-        np.take(self.e, self.discrete_source, out=self.d, mode="clip")
+        self.e.take(self.discrete_source, out=self.d, mode="clip")
         if self.discrete_gain is not None and self.discrete_offset is not None:
             self.d[:] = self.d * self.discrete_gain + self.discrete_offset
         for node in self.discrete:

@@ -70,6 +70,16 @@ class Work:
                 interface.motion.values.copy() if interface.relative else np.zeros(interface.loads.size)
             )
 
+    def save(self) -> tuple[np.ndarray, list[np.ndarray]]:
+        """Return what `restore` needs."""
+        return self.total.copy(), [interface.before for interface in self.interfaces]
+
+    def restore(self, saved: tuple[np.ndarray, list[np.ndarray]]) -> None:
+        """Go back: the steps booked since are not made."""
+        self.total[:] = saved[0]
+        for interface, before in zip(self.interfaces, saved[1], strict=True):
+            interface.before = before
+
     def __call__(self, t: float, H: float) -> None:
         """Book the step from `t` to `t + H`."""
         for i, interface in enumerate(self.interfaces):

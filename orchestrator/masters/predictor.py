@@ -31,6 +31,16 @@ class Predictor:
         self.predictions: list[np.ndarray] = []
         self.errors = np.zeros(HIGHEST + 1)
 
+    def save(self) -> tuple[list, list, np.ndarray]:
+        """Return what `restore` needs."""
+        return list(self.points), self.predictions, self.errors.copy()
+
+    def restore(self, saved: tuple[list, list, np.ndarray]) -> None:
+        """Go back."""
+        points, self.predictions, errors = saved
+        self.points = deque(points, maxlen=HIGHEST + 1)
+        self.errors = errors.copy()
+
     def append(self, time: float, x: np.ndarray, scale: np.ndarray) -> None:
         """Remember the converged unknowns `x` (n,), of magnitudes `scale` (n,), of the step around `time`."""
         for k, guess in enumerate(self.predictions):
