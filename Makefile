@@ -26,6 +26,7 @@ $(STAMP): pyproject.toml
 	@touch $@
 
 run: env
+	$(BIN)/orchestrator build
 	$(BIN)/orchestrator compare scenarios/landing_200m_point9.toml
 
 test: env
@@ -42,7 +43,7 @@ verify: env
 	$(BIN)/python -m pytest -q -m slow
 
 bench: env
-	@for file in benchmarks/*.py; do echo "== $$file"; $(BIN)/python "$$file"; done
+	@for file in $(wildcard benchmarks/*.py); do echo "== $$file"; $(BIN)/python "$$file"; done
 
 clean:
 	rm -rf $(VENV) build fmu

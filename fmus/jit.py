@@ -2,7 +2,7 @@
 
 A *kernel* is a plain loop over ``float64`` arrays that are passed in, workspaces too: no exceptions, no
 allocation in the step path, an integer status returned. Compiled code is cached on disk, in a folder named
-after the hash of every source file of the package: Numba itself looks only at the file of the kernel called,
+after the hash of all sources with kernels in the package: Numba itself looks only at the file of the kernel called,
 so that a change in a kernel *called by it* would otherwise go on running the old code.
 """
 
@@ -18,18 +18,20 @@ import numba
 PACKAGE = Path(__file__).resolve().parent
 
 
-def source_hash(package: Path = PACKAGE) -> str:
-    """Return a hash of all Python sources below `package` (16 hexadecimal digits)."""
+def source_hash(package: Path = PACKAGE, marker: bytes = b"") -> str:
+    """Return a hash of the Python sources below `package` that contain `marker` (16 hexadecimal digits)."""
     digest = hashlib.sha256()
     for path in sorted(package.rglob("*.py")):
-        digest.update(path.relative_to(package).as_posix().encode())
-        digest.update(path.read_bytes())
+        content = path.read_bytes()
+        if marker in content:
+            digest.update(path.relative_to(package).as_posix().encode())
+            digest.update(content)
     return digest.hexdigest()[:16]
 
 
 def _cache_folder() -> Path:
     for base in (PACKAGE / "__pycache__", Path.home() / ".cache" / "line-landing", Path(tempfile.gettempdir())):
-        folder = base / f"numba-{source_hash()}"
+        folder = base / f"numba-{source_hash(marker=b'@kernel')}"
         try:
             folder.mkdir(parents=True, exist_ok=True)
         except OSError:

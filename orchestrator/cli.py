@@ -281,7 +281,9 @@ def _print_comparison(comparison: Comparison) -> None:
 
     reference = comparison.reference
     print(f"reference: {reference.kind}, {reference.wall_s:.2f} s")
-    costs = Table("master", "H \\[s]", "iterations", "unconverged", "cable steps", "wall \\[s]", box=None, pad_edge=False)
+    costs = Table(
+        "master", "H \\[s]", "iterations", "unconverged", "cable steps", "wall \\[s]", box=None, pad_edge=False
+    )
     for r in comparison.runs:
         numbers = (
             f"{r.iterations_per_step:.2f}",

@@ -16,7 +16,7 @@ from typing import Any
 import numpy as np
 
 from fmus.variables import ModuleError
-from orchestrator import landing, monolithic, vocabulary
+from orchestrator import landing, library, monolithic, vocabulary
 from orchestrator.compare import (
     Comparison,
     Reference,
@@ -140,7 +140,7 @@ def _general_graph(scenario: Scenario) -> Graph:
     components: dict[str, Fmu] = {}
     try:
         for name, section in scenario.components.items():
-            components[name] = Fmu(section.fmu, name)
+            components[name] = Fmu(section.fmu or library.module_fmu(str(section.model)), name)
             components[name].set_parameters({**section.parameters, **section.inputs})
         return Graph(components, [_connection(text) for text in scenario.connections])
     except BaseException:

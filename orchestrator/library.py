@@ -4,6 +4,7 @@ from __future__ import annotations
 
 import os
 from collections.abc import Iterator
+from importlib import import_module
 from pathlib import Path
 
 from fmus.recipe import FmuRecipe
@@ -11,25 +12,33 @@ from orchestrator.robots import RobotSpec, catalogue
 
 FOLDER = Path(os.environ.get("LINE_LANDING_FMUS", "fmu"))
 """Where runs look for our FMUs and build them."""
+MODULES = ("cable", "contact", "oscillator")
+"""Our modules with one FMU each; robots have one for each entry of the catalogue."""
 
 
 def cable_fmu() -> Path:
     """Return the FMU of the cable, up to date."""
-    from fmus.cable.cable_fmu import RECIPE
-
-    return _ensured(RECIPE)
+    return module_fmu("cable")
 
 
 def contact_fmu() -> Path:
     """Return the FMU of the contact, up to date."""
-    from fmus.contact.contact_fmu import RECIPE
+    return module_fmu("contact")
 
-    return _ensured(RECIPE)
+
+def module_fmu(name: str) -> Path:
+    """Return the FMU of one of `MODULES`, up to date."""
+    return _ensured(module_recipe(name), FOLDER)
 
 
 def robot_fmu(robot: RobotSpec) -> Path:
     """Return the FMU of a robot of the catalogue, up to date."""
-    return _ensured(robot_recipe(robot))
+    return _ensured(robot_recipe(robot), FOLDER)
+
+
+def module_recipe(name: str) -> FmuRecipe:
+    """Return the recipe of one of `MODULES`."""
+    return import_module(f"fmus.{name}.{name}_fmu").RECIPE
 
 
 def robot_recipe(robot: RobotSpec) -> FmuRecipe:
@@ -40,18 +49,13 @@ def robot_recipe(robot: RobotSpec) -> FmuRecipe:
 
 
 def build_all(folder: Path) -> Iterator[Path]:
-    """Build the FMUs of cable, contact and every robot of the catalogue; yield each when it is there."""
+    """Build the FMUs of all modules and of every robot of the catalogue; yield each when it is there."""
+    for recipe in (*map(module_recipe, MODULES), *map(robot_recipe, catalogue().values())):
+        yield _ensured(recipe, folder)
+
+
+def _ensured(recipe: FmuRecipe, folder: Path) -> Path:
     from fmus.build import ensure_fmu
-    from fmus.cable.cable_fmu import RECIPE as CABLE
-    from fmus.contact.contact_fmu import RECIPE as CONTACT
 
     folder.mkdir(parents=True, exist_ok=True)
-    for recipe in (CABLE, CONTACT, *map(robot_recipe, catalogue().values())):
-        yield ensure_fmu(recipe, folder)
-
-
-def _ensured(recipe: FmuRecipe) -> Path:
-    from fmus.build import ensure_fmu
-
-    FOLDER.mkdir(parents=True, exist_ok=True)
-    return ensure_fmu(recipe, FOLDER)
+    return ensure_fmu(recipe, folder)

@@ -108,11 +108,18 @@ class Landing(Section):
 
 
 class Component(Section):
-    """One FMU of a general graph."""
+    """One FMU of a general graph: any (`fmu`), or one of our modules (`model`)."""
 
-    fmu: str
+    model: str | None = None
+    fmu: str | None = None
     parameters: Settings = {}
     inputs: Settings = {}
+
+    @model_validator(mode="after")
+    def _one_source(self) -> Component:
+        if (self.model is None) == (self.fmu is None):
+            raise ValueError(f'give either fmu = "FILE.fmu" or model = one of {", ".join(vocabulary.MODELS)}')
+        return self
 
 
 @dataclass(frozen=True)
@@ -416,7 +423,7 @@ def _component_problems(
     try:
         known = vocabulary.of_fmu(Path(fmu)) if isinstance(fmu, str) else _own(kind, section)
     except InputError as error:
-        yield from (Problem(f"{path}.fmu", problem) for problem in error.problems)
+        yield from (Problem(f"{path}.{'fmu' if fmu else 'model'}", problem) for problem in error.problems)
         return
     for group, causality in (("parameters", "parameter"), ("inputs", "input")):
         values = section.get(group, {})
@@ -432,8 +439,13 @@ def _component_problems(
 
 
 def _own(kind: str, section: Document) -> dict[str, vocabulary.Variable]:
-    """Return the variables of our own module; a general graph has none (its missing `fmu` is reported)."""
-    return vocabulary.of_module(kind, section.get("model")) if kind else {}
+    """Return the variables of our own module: a landing's `kind`, or a component's `model`."""
+    if kind:
+        return vocabulary.of_module(kind, section.get("model"))
+    model = section.get("model")
+    if isinstance(model, str) and model not in vocabulary.MODELS:
+        raise InputError(f"no model {model!r}{nearest(model, vocabulary.MODELS)}")
+    return vocabulary.of_module(model) if isinstance(model, str) else {}
 
 
 def _value_problems(path: str, variable: vocabulary.Variable, value: Any) -> Iterator[Problem]:

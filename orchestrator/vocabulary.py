@@ -3,11 +3,12 @@
 from __future__ import annotations
 
 import zipfile
+from importlib import import_module
 from inspect import signature
 from pathlib import Path
 from typing import Any
 
-from fmus.variables import Kind, Variable
+from fmus.variables import Kind, Value, Variable
 from orchestrator.errors import InputError
 
 KINDS: dict[str, Kind] = {"Real": "real", "Float64": "real", "Float32": "real", "Boolean": "boolean"}
@@ -20,27 +21,28 @@ KINDS |= {
 }
 
 
+MODELS = {
+    "cable": ("fmus.cable.module", "Cable"),
+    "contact": ("fmus.contact.module", "Contact"),
+    "oscillator": ("fmus.oscillator.module", "Oscillator"),
+}
+"""Our modules with one table each: file and class."""
+
+
 def of_module(kind: str, robot: str | None = None) -> dict[str, Variable]:
     """Return the variables of our own module by name, from its table.
 
     Parameters
     ----------
-    kind : ``cable``, ``contact`` or ``robot``
+    kind : one of `MODELS`, or ``robot``
     robot : name of the catalogue; the number of its wheels decides which variables there are
     """
-    if kind == "cable":
-        from fmus.cable.module import Cable
-
-        table = Cable.table
-    elif kind == "contact":
-        from fmus.contact.module import Contact
-
-        table = Contact.table
-    else:
+    if kind == "robot":
         from orchestrator.robots import load_robot
 
         return robot_variables(load_robot(robot).n_wheels if robot in robots() else 1)
-    return {v.name: v for v in table.variables}
+    file, name = MODELS[kind]
+    return {v.name: v for v in getattr(import_module(file), name).table.variables}
 
 
 def robot_variables(n_wheels: int) -> dict[str, Variable]:
@@ -55,15 +57,28 @@ def of_fmu(path: Path) -> dict[str, Variable]:
     known: dict[str, Variable] = {}
     for v in description(path).modelVariables:
         parameter = v.causality == "parameter" or (v.causality == "local" and v.variability == "tunable")
+        kind = KINDS.get(v.type, "real")
         known[v.name] = Variable(
             v.name,
             "parameter" if parameter else "input" if v.causality == "input" else "output",
             v.unit or (v.declaredType.unit if v.declaredType else None) or "1",
-            v.start if v.start is not None else "",
+            _start(v.start, kind),
             v.description or "",
-            KINDS.get(v.type, "real"),
+            kind,
         )
     return known
+
+
+def _start(text: str | None, kind: Kind) -> Value:
+    """Return a start value of a model description; an empty string if there is none, or an array's."""
+    if text is None or kind == "string":
+        return text or ""
+    if kind == "boolean":
+        return text in ("true", "1")
+    try:
+        return int(text) if kind == "integer" else float(text)
+    except ValueError:
+        return ""
 
 
 def description(path: Path) -> Any:

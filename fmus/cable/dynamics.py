@@ -16,22 +16,23 @@ from fmus import banded
 from fmus.cable.assembly import (
     HALF_BANDWIDTH,
     ElementWork,
-    Model,
     add_inertia,
     add_load,
     constrain_vector,
+    dot,
     element_work,
     internal_force,
     interpolate,
     iteration_matrix,
+    kinetic_energy,
     locate,
 )
 from fmus.jit import kernel
-from fmus.time_integration import Collocation, GeneralizedAlpha
 
 N_PORTS = 4
-N_SUMS = 2 + N_PORTS
-"""Dissipated energy, length of the last inner step, work done through each port."""
+DISSIPATED, LAST_INNER, LAST_MACRO, WORK = range(4)
+"""Places behind the coordinates in the state; the work done through each port stands last."""
+N_SUMS = WORK + N_PORTS
 MAX_ITERATIONS = 12
 SLOW = 0.25
 """Contraction of an iteration above which the iteration matrix is made anew."""
@@ -65,6 +66,7 @@ class Work(NamedTuple):
     trial: np.ndarray
     first: np.ndarray
     power: np.ndarray
+    means: np.ndarray
 
 
 def make_work(n: int, state_size: int) -> Work:
@@ -92,6 +94,7 @@ def make_work(n: int, state_size: int) -> Work:
         trial=np.zeros(state_size),
         first=np.zeros((N_PORTS, 3)),
         power=np.zeros(2),
+        means=np.zeros((N_PORTS, 6)),
     )
 
 
@@ -142,7 +145,7 @@ def _moment_work(model, q, v, ports, offset, weight, sums, work):
         power = moment[0] * (g[1] * gd[2] - g[2] * gd[1])
         power += moment[1] * (g[2] * gd[0] - g[0] * gd[2])
         power += moment[2] * (g[0] * gd[1] - g[1] * gd[0])
-        sums[2 + k] += weight * power / square
+        sums[WORK + k] += weight * power / square
 
 
 @kernel
@@ -197,7 +200,7 @@ def collocation_step(model, method, state, h, offset, ports, tolerance, fresh, w
     """
     n = model.weight.size
     q0, v0, a, sums = state[:n], state[n : 2 * n], state[2 * n : 4 * n].reshape(2, n), state[4 * n :]
-    ratio = h / sums[1] if sums[1] > 0.0 else 0.0
+    ratio = h / sums[LAST_INNER] if sums[LAST_INNER] > 0.0 else 0.0
     for i in range(n):  # the stage accelerations go on along their line
         slope = (a[1, i] - a[0, i]) / (method.c[1] - method.c[0])
         for j in range(2):
@@ -250,14 +253,14 @@ def collocation_step(model, method, state, h, offset, ports, tolerance, fresh, w
             return NOT_CONVERGED
     for j in range(2):
         weight = h * method.b[j]
-        sums[0] += weight * power[j]
+        sums[DISSIPATED] += weight * power[j]
         _moment_work(model, work.q[j], work.v[j], ports, offset + method.c[j] * h, weight, sums, work)
     for i in range(n):
         a0, a1 = work.a[0, i], work.a[1, i]
         q0[i] += h * (v0[i] + h * (method.bb[0] * a0 + method.bb[1] * a1))
         v0[i] += h * (method.b[0] * a0 + method.b[1] * a1)
         a[0, i], a[1, i] = a0, a1
-    sums[1] = h
+    sums[LAST_INNER] = h
     return OK
 
 
@@ -309,14 +312,14 @@ def generalized_alpha_step(model, method, state, h, offset, ports, tolerance, fr
         previous = change
         if iteration == MAX_ITERATIONS - 1:
             return NOT_CONVERGED
-    sums[0] += h * power
+    sums[DISSIPATED] += h * power
     _moment_work(model, q, v, ports, at, h, sums, work)
     for i in range(n):
         q0[i] += h * (v0[i] + h * ((0.5 - beta) * a[0, i] + beta * a1[i]))
         v0[i] += h * ((1.0 - gamma) * a[0, i] + gamma * a1[i])
         a[1, i] = cm * a1[i] + am * a[0, i]
         a[0, i] = a1[i]
-    sums[1] = h
+    sums[LAST_INNER] = h
     return OK
 
 
@@ -388,33 +391,9 @@ def macro_step(model, collocation, alpha, use_alpha, state, h, longest, ports, m
         for i in range(3):
             force, rate = ports[k, 1 + i], ports[k, 7 + i]
             end = work.start[k, i]
-            sums[2 + k] += force * (end - first[k, i]) + rate * h * (0.5 * (first[k, i] + end) - means[k, i])
+            sums[WORK + k] += force * (end - first[k, i]) + rate * h * (0.5 * (first[k, i] + end) - means[k, i])
+    sums[LAST_MACRO] = h
     return OK
-
-
-@kernel
-def reactions(model, method, use_alpha, state, ports, offset, out, work):
-    """Write the forces of the left and the right support on the cable to `out` (2, 3)."""
-    n = model.weight.size
-    for i in range(n):
-        if use_alpha:
-            work.a[0, i] = state[2 * n + i]
-        else:
-            work.a[0, i] = method.end[0] * state[2 * n + i] + method.end[1] * state[3 * n + i]
-    _port_loads(model, state[:n], ports, offset, work)
-    residual(
-        model,
-        state[:n],
-        state[n : 2 * n],
-        work.a[0],
-        work.external,
-        work.residual[0],
-        work.axial,
-        work.element,
-    )
-    for k in range(3):
-        out[0, k] = work.residual[0, k]
-        out[1, k] = work.residual[0, n - 6 + k]
 
 
 @kernel
@@ -427,12 +406,58 @@ def mean_axial_force(model, s, axial, shape):
 
 
 @kernel
-def sample_shape(model, state, axial, shape, rows, point):
-    """Write position and axial force at equally spaced arc lengths to `rows` (m, 4)."""
+def show_ports(model, state, ports, shown, work):
+    """Write position, tangent, velocity and tangent rate of every port to the rows of `shown` (N_PORTS, 19)."""
+    for k in range(N_PORTS):
+        port_motion(model, state, ports[k, 0], work.shape, shown[k, 0:12])
+
+
+@kernel
+def step_and_show(model, collocation, alpha, use_alpha, state, h, longest, ports, shown, out, rows, work):
+    """Make a macro step and write all outputs: `macro_step`, `show_ports` and `diagnose` in one call."""
+    status = macro_step(model, collocation, alpha, use_alpha, state, h, longest, ports, work.means, work)
+    if status != OK:
+        return status
+    show_ports(model, state, ports, shown, work)
+    for k in range(N_PORTS):
+        for i in range(6):
+            shown[k, 12 + i] = work.means[k, i]
+        shown[k, 18] = state[4 * model.weight.size + WORK + k]
+    diagnose(model, collocation, use_alpha, state, ports, out, rows, work)
+    return OK
+
+
+@kernel
+def diagnose(model, method, use_alpha, state, ports, out, rows, work):
+    """Write what is shown of the cable besides its ports.
+
+    Parameters
+    ----------
+    ports : (N_PORTS, 13), the loads of the macro step that has just been made
+    out : (13,), receives tension left, mid, right, kinetic, elastic, gravitational and dissipated energy, force of the left
+        support (3) and of the right one (3) on the cable
+    rows : (m, 4), receives position and axial force at equally spaced arc lengths
+    """
     n = model.weight.size
+    q, v, force = state[:n], state[n : 2 * n], work.residual[0]
+    for i in range(n):
+        end = method.end[0] * state[2 * n + i] + method.end[1] * state[3 * n + i]
+        work.a[0, i] = state[2 * n + i] if use_alpha else end
+    out[3] = kinetic_energy(model, v, work.element, force)
+    out[4] = internal_force(model, q, v, force, work.axial, work.element)[0]
+    out[5] = -dot(model.weight, q)
+    out[6] = state[4 * n + DISSIPATED]
+    add_inertia(model, work.a[0], force, work.element)
+    _port_loads(model, q, ports, 0.5 * state[4 * n + LAST_MACRO], work)
+    for k in range(3):
+        out[7 + k] = force[k] - model.weight[k] - work.external[k]
+        out[10 + k] = force[n - 6 + k] - model.weight[n - 6 + k] - work.external[n - 6 + k]
+    out[0] = np.sqrt(out[7] ** 2 + out[8] ** 2 + out[9] ** 2)
+    out[1] = mean_axial_force(model, 0.5 * model.s[-1], work.axial, work.shape)
+    out[2] = np.sqrt(out[10] ** 2 + out[11] ** 2 + out[12] ** 2)
     for i in range(rows.shape[0]):
         s = model.s[-1] * i / (rows.shape[0] - 1)
-        interpolate(model, state[:n], s, shape, point[0])
+        interpolate(model, q, s, work.shape, work.point[0])
         for k in range(3):
-            rows[i, k] = point[0, k]
-        rows[i, 3] = mean_axial_force(model, s, axial, shape)
+            rows[i, k] = work.point[0, k]
+        rows[i, 3] = mean_axial_force(model, s, work.axial, work.shape)

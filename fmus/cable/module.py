@@ -6,7 +6,7 @@ import numpy as np
 from scipy.optimize import brentq
 
 from fmus.cable import dynamics
-from fmus.cable.assembly import Model, dot, interpolate, internal_force, kinetic_energy
+from fmus.cable.assembly import Model, interpolate
 from fmus.cable.dynamics import N_PORTS
 from fmus.cable.statics import equilibrium, mesh_model
 from fmus.time_integration import collocation, generalized_alpha
@@ -122,14 +122,18 @@ class Cable:
     def __init__(self) -> None:
         self.values = self.table.defaults()
         self.state = np.zeros(0)
+        self._ports = self._rows("port[1].s", N_PORTS, 13)
+        self._shown_ports = self._rows("port[1].position.x", N_PORTS, 19)
+        self._shape = self._rows("shape[1].position.x", N_SHAPE, 4)
+        self._shown = self._rows("tension_left", 1, 13)[0]
+
+    def _rows(self, first: str, n: int, width: int) -> np.ndarray:
+        """Return a view (n, width) of the values from the variable `first` on."""
+        start = self.table.index[first]
+        return self.values[start : start + n * width].reshape(n, width)
 
     def __getitem__(self, name: str) -> float:
         return float(self.values[self.table.index[name]])
-
-    @property
-    def _ports(self) -> np.ndarray:
-        first = self.table.index["port[1].s"]
-        return self.values[first : first + 13 * N_PORTS].reshape(N_PORTS, 13)
 
     def initialize(self, t: float) -> None:
         """Mesh the cable, find its static equilibrium, start the state there; raises `ModuleError`."""
@@ -144,10 +148,9 @@ class Cable:
         self._alpha = generalized_alpha(self["spectral_radius"])
         self._use_alpha = self["integrator"] == 1.0
         self._work = dynamics.make_work(n, self.state.size)
-        self._means = np.zeros((N_PORTS, 6))
-        self._means_valid = False
-        self._offset = 0.0
-        self.refresh()
+        self.show()
+        self._shown_ports[:, 12:18] = self._shown_ports[:, :6]
+        self._shown_ports[:, 18] = 0.0
 
     def _rest(self, length: float) -> tuple[Model, np.ndarray]:
         """Return the cable of the given unstretched length and its equilibrium (n,)."""
@@ -210,7 +213,7 @@ class Cable:
             raise ModuleError(
                 f"cable: port[{k + 1}].s = {self._ports[k, 0]:g} m is off the cable (0 to {self.model.s[-1]:g} m)"
             )
-        status = dynamics.macro_step(
+        status = dynamics.step_and_show(
             self.model,
             self._collocation,
             self._alpha,
@@ -219,7 +222,9 @@ class Cable:
             h,
             self["integration_step"],
             self._ports,
-            self._means,
+            self._shown_ports,
+            self._shown,
+            self._shape,
             self._work,
         )
         if status != dynamics.OK:
@@ -227,43 +232,21 @@ class Cable:
                 f"cable: Newton's method does not converge at t = {t:g} s, even with inner steps of "
                 f"{min(h, self['integration_step']) / 2**dynamics.MAX_HALVINGS:.3g} s; check the loads at the ports"
             )
-        self._means_valid = True
-        self._offset = 0.5 * h
-        self.refresh()
-        self._write_means()
-
-    def _write_means(self) -> None:
-        first = self.table.index["port[1].position.x"]
-        self.values[first : first + 19 * N_PORTS].reshape(N_PORTS, 19)[:, 12:18] = self._means
 
     def refresh(self) -> None:
-        """Write the outputs at the present state and port arc lengths; means stay those of the last macro step."""
-        n = self.model.weight.size
-        state, work, values, index = self.state, self._work, self.values, self.table.index
-        first = index["port[1].position.x"]
-        ports = values[first : first + 19 * N_PORTS].reshape(N_PORTS, 19)
-        for k in range(N_PORTS):
-            dynamics.port_motion(self.model, state, self._ports[k, 0], work.shape, ports[k, :12])
-        if not self._means_valid:
-            ports[:, 12:18] = ports[:, :6]
-        ports[:, 18] = state[4 * n + 2 :]
-        q, v = state[:n], state[n : 2 * n]
-        strain_energy, _ = internal_force(self.model, q, v, work.residual[0], work.axial, work.element)
-        first = index["tension_left"]
-        values[first + 1] = dynamics.mean_axial_force(self.model, 0.5 * self.model.s[-1], work.axial, work.shape)
-        self._write_shape(work.axial.copy())
-        values[first + 3] = kinetic_energy(self.model, v, work.element, work.residual[0])
-        values[first + 4] = strain_energy
-        values[first + 5] = -dot(self.model.weight, q)
-        values[first + 6] = state[4 * n]
-        reaction = values[first + 7 : first + 13].reshape(2, 3)
-        dynamics.reactions(
-            self.model, self._collocation, self._use_alpha, state, self._ports, self._offset, reaction, work
-        )
-        values[first] = np.linalg.norm(reaction[0])
-        values[first + 2] = np.linalg.norm(reaction[1])
+        """Write the motion of the ports at the present state and arc lengths; all else stays as the last step left it."""
+        dynamics.show_ports(self.model, self.state, self._ports, self._shown_ports, self._work)
 
-    def _write_shape(self, axial: np.ndarray) -> None:
-        first = self.table.index["shape[1].position.x"]
-        rows = self.values[first : first + 4 * N_SHAPE].reshape(N_SHAPE, 4)
-        dynamics.sample_shape(self.model, self.state, axial, self._work.shape, rows, self._work.point)
+    def show(self) -> None:
+        """Write all outputs but means and work at the present state, whoever has put it there."""
+        self.refresh()
+        dynamics.diagnose(
+            self.model,
+            self._collocation,
+            self._use_alpha,
+            self.state,
+            self._ports,
+            self._shown,
+            self._shape,
+            self._work,
+        )

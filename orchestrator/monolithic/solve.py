@@ -20,12 +20,11 @@ from fmus.variables import ModuleError
 from orchestrator.monolithic import system as kernels
 from orchestrator.monolithic.system import N_CONTACT, N_ROBOT, State, System
 
-SAFETY, GROW, SHRINK = 0.8, 2.0, 0.2
-SHORTEST = 1e-7
-"""s; a shorter step means that the equations cannot be solved."""
-LONGEST = 2.5e-3
+LONGEST = 1.4e-3
 """s; longest step at the default tolerance, it resolves the cable's waves (docs/verification.md)."""
-TOLERANCE = 1e-8
+EVENT = 6e-5
+"""s; longest step at the default tolerance in which a contact may open, close, begin or cease to slide."""
+TOLERANCE = 1e-9
 """m, local error of the robot's position a step allowed by default."""
 NEWTON = 1e-12
 
@@ -66,8 +65,8 @@ class Solution:
 class Integrator:
     """The system's state and the steps that advance it."""
 
-    def __init__(self, problem: Problem, tolerance: float = TOLERANCE):
-        self.problem, self.tolerance = problem, tolerance
+    def __init__(self, problem: Problem, tolerance: float = TOLERANCE, refinement: int = 1):
+        self.problem = problem
         cable, robot = problem.cable, problem.robot
         self.method = collocation(cable["spectral_radius"])
         n_wheels = len(problem.contacts)
@@ -79,40 +78,26 @@ class Integrator:
         self.state = State(cable.state.copy(), initial_state(robot.values, robot.table), np.zeros((2, N_ROBOT)), memory)
         self.work = dynamics.make_work(cable.model.weight.size, cable.state.size)
         self.space = kernels.make_space(cable.model.weight.size, n_wheels)
+        self.refinement = refinement
         self.longest = LONGEST * (tolerance / TOLERANCE) ** 0.25
-        self.h = 0.02 * self.longest
-        self.steps, self.iterations, self._fresh, self._used_h = 0, 0, 2, 0.0
+        event = EVENT * (tolerance / TOLERANCE) ** 0.25
+        self.control = np.array([0.02 * self.longest, self.longest, tolerance, event, NEWTON, 0.0, 0.0, 0.0, 0.0])
         if kernels.settle(self.system, self.state, False, self.space, self.work) != kernels.OK:
             raise ModuleError("monolithic: the contact law fails at the start; check the initial pose of the robot")
 
+    @property
+    def steps(self) -> int:
+        """Number of steps made."""
+        return int(self.control[kernels.STEPS])
+
     def advance(self, t: float, end: float) -> None:
         """Integrate from `t` to `end` with controlled steps; raises `ModuleError` if none is short enough."""
-        while end - t > 1e-12 * max(1.0, end):
-            left = end - t
-            h = left / max(1.0, np.ceil(left / min(self.h, self.longest) - 1e-9))
-            t += self._try(t, h)
-
-    def _try(self, t: float, h: float) -> float:
-        """Try one step of `h`; return what was advanced (0 if it is to be repeated) and choose the next length."""
-        fresh = self._fresh > 0 or abs(h - self._used_h) > 1e-9 * h
-        status, error, iterations = kernels.step(
-            self.system, self.state, h, NEWTON, fresh, self.space, self.work, self.tolerance
-        )
-        self.iterations += iterations
-        if status != kernels.OK or error > self.tolerance:
-            factor = SHRINK if status != kernels.OK else max(SHRINK, SAFETY * (self.tolerance / error) ** 0.25)
-            self.h, self._fresh = h * factor, 1
-            if self.h < SHORTEST:
-                raise ModuleError(
-                    f"monolithic: no step is short enough at t = {t:g} s; check stiffness and damping of the contact"
-                )
-            return 0.0
-        self.steps += 1
-        self._used_h, self._fresh = h, 1 if iterations > 4 else 0
-        wanted = h * min(GROW, SAFETY * (self.tolerance / max(error, 1e-300)) ** 0.25)
-        if wanted > 1.3 * h or wanted < h:  # a step kept is a matrix kept
-            self.h = wanted
-        return h
+        self.control[kernels.LONGEST] = min(self.longest, (end - t) / self.refinement)
+        status, reached = kernels.advance(self.system, self.state, self.control, t, end, self.space, self.work)
+        if status != kernels.OK:
+            raise ModuleError(
+                f"monolithic: no step is short enough at t = {reached:g} s; check stiffness and damping of the contact"
+            )
 
 
 def _control(robot: Robot, n_wheels: int) -> np.ndarray:
@@ -158,15 +143,17 @@ class _Recorder:
         kernels.settle(system, state, False, space, self.integrator.work)
         out = space.out[0]
         for k in range(len(state.contacts)):
-            self.cable.values[self.cable.table.index[f"port[{k + 1}].s"]] = state.contacts[k, kernels.S]
             row, memory = out[k], state.contacts[k]
+            first = self.cable.table.index[f"port[{k + 1}].s"]
+            self.cable.values[first] = memory[kernels.S]
+            self.cable.values[first + 1 : first + 7] = 0.0 if memory[kernels.LEFT] else row[:6]
             self.contact_rows[i, k] = (
                 row[12], np.hypot(row[13], row[14]), row[15], np.hypot(row[16], row[17]), row[18],
                 3.0 if memory[kernels.LEFT] else row[19], memory[kernels.WALLS] + memory[kernels.FRICTION],
                 row[25] + row[26], memory[kernels.S],
             )  # fmt: skip
         self.cable.state[:] = state.cable
-        self.cable.refresh()
+        self.cable.show()
         self.cable_rows[i] = self.cable.values[self.cable_at]
         self._robot_state[: rigid_body.RIGID] = state.robot
         follow_euler(state.robot[3:7], self._angles)
@@ -188,6 +175,7 @@ def integrate(
     times: np.ndarray,
     tolerance: float = TOLERANCE,
     progress: Callable[[float], None] | None = None,
+    refinement: int = 1,
 ) -> Solution:
     """Solve once.
 
@@ -197,8 +185,9 @@ def integrate(
     times : (n,) ascending output times, s; the first one is the start
     tolerance : local error of the robot's position allowed a step, m
     progress : called with the time reached
+    refinement : at least so many steps between two output times
     """
-    integrator = Integrator(make(), tolerance)
+    integrator = Integrator(make(), tolerance, refinement)
     recorder = _Recorder(integrator, len(times))
     recorder.record(0)
     start = clock.perf_counter()
@@ -218,7 +207,7 @@ def solve(
     estimate: bool = True,
     progress: Callable[[float], None] | None = None,
 ) -> Solution:
-    """Solve, and estimate the error by a second solution with a tolerance ten times as wide.
+    """Solve, and estimate the error by a second solution with a tolerance ten times as wide and steps twice as long.
 
     The estimate is the whole difference of the two, an upper bound for the error of the one returned as long as the
     error falls with the tolerance. Parameters as in `integrate`.
@@ -226,7 +215,7 @@ def solve(
     if not estimate:
         return integrate(make, times, tolerance, progress)
     coarse = integrate(make, times, 10.0 * tolerance, progress)
-    fine = integrate(make, times, tolerance, progress)
+    fine = integrate(make, times, tolerance, progress, refinement=2)
     fine.wall_estimate_s = coarse.wall_s
     fine.estimated_error = {
         name: float(np.max(np.abs(values - coarse.signals[name]))) for name, values in fine.signals.items()

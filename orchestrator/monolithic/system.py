@@ -16,7 +16,7 @@ import numpy as np
 
 from fmus import banded
 from fmus.cable.assembly import HALF_BANDWIDTH, Model, constrain_vector, interpolate, iteration_matrix, locate
-from fmus.cable.dynamics import residual
+from fmus.cable.dynamics import DISSIPATED, LAST_INNER, residual
 from fmus.contact import law
 from fmus.jit import kernel
 from fmus.robot import rigid_body as rb
@@ -25,14 +25,19 @@ from fmus.time_integration import Collocation
 
 N_ROBOT = 10
 """Accelerations of the robot: centre of mass 3, angular velocity 3, spin of four wheels."""
-S, SLIP, WALLS, FRICTION, LEFT = 0, 1, 3, 4, 5
-N_CONTACT = 6
-"""Memory of a contact: arc length, bristle (2), energy dissipated by walls and by friction, left the groove."""
+S, SLIP, WALLS, FRICTION, LEFT, STATUS = 0, 1, 3, 4, 5, 6
+N_CONTACT = 7
+"""Memory of a contact: arc length, bristle (2), energy dissipated by walls and by friction, left the groove, status."""
 MAX_ITERATIONS = 15
 SLOW = 0.2
 ERROR_FACTOR = 0.01
 """Local error of a step over h² times the change of the robot's accelerations against those predicted."""
 OK, NOT_CONVERGED, CONTACT_FAILED = 0, 1, 2
+SAFETY, GROW, SHRINK = 0.8, 2.0, 0.2
+SHORTEST = 1e-7
+"""s; a shorter step means that the equations cannot be solved."""
+WANTED, LONGEST, ALLOWED, EVENT, NEWTON, MATRIX, STEPS, ITERATIONS, REJECTED = range(9)
+"""Places in the control of `advance`."""
 
 
 class System(NamedTuple):
@@ -53,7 +58,7 @@ class System(NamedTuple):
 
 
 class State(NamedTuple):
-    """What changes: cable (its module's flat state), robot (21,), its stage accelerations (2, 10), contacts (n_wheels, 6)."""
+    """What changes: cable (its module's flat state), robot (21,), its stage accelerations (2, 10), contacts (n_wheels, 7)."""
 
     cable: np.ndarray
     robot: np.ndarray
@@ -473,7 +478,7 @@ def _newton(system, h, space, work):
 def _predict(system, state, h, space, work):
     """Take the stage accelerations from the line through those of the last step."""
     method, n = system.method, system.model.weight.size
-    a, last = state.cable[2 * n : 4 * n].reshape(2, n), state.cable[4 * n + 1]
+    a, last = state.cable[2 * n : 4 * n].reshape(2, n), state.cable[4 * n + LAST_INNER]
     ratio = h / last if last > 0.0 else 0.0
     for j in range(2):
         at = (1.0 + ratio * method.c[j] - method.c[0]) / (method.c[1] - method.c[0]) if ratio > 0.0 else 1.0
@@ -493,8 +498,8 @@ def _accept(system, state, h, space, work):
         q0[i] += h * (v0[i] + h * (method.bb[0] * a0 + method.bb[1] * a1))
         v0[i] += h * (method.b[0] * a0 + method.b[1] * a1)
         state.cable[2 * n + i], state.cable[3 * n + i] = a0, a1
-    state.cable[4 * n] += h * (method.b[0] * work.power[0] + method.b[1] * work.power[1])
-    state.cable[4 * n + 1] = h
+    state.cable[4 * n + DISSIPATED] += h * (method.b[0] * work.power[0] + method.b[1] * work.power[1])
+    state.cable[4 * n + LAST_INNER] = h
     r, b = state.robot, space.b
     rate = space.quaternions
     for j in range(2):
@@ -547,6 +552,8 @@ def settle(system, state, move, space, work):
     for k in range(system.contacts.shape[0]):
         space.trial[k, 0], space.trial[k, 1] = state.contacts[k, SLIP], state.contacts[k, SLIP + 1]
     _loads(system, state.robot, space.cable_point, space.trial, state.contacts, space.out[0], space.generalized, space)
+    for k in range(system.contacts.shape[0]):
+        state.contacts[k, STATUS] = space.out[0, k, 19]
     if move:
         for k in range(system.contacts.shape[0]):
             out, memory = space.out[0, k], state.contacts[k]
@@ -559,8 +566,10 @@ def settle(system, state, move, space, work):
 
 
 @kernel
-def step(system, state, h, tolerance, fresh, space, work, allowed):
+def step(system, state, h, tolerance, fresh, space, work, allowed, event):
     """Advance `state` by one step `h`; it is unchanged unless the status is OK and the error at most `allowed`.
+
+    A step longer than `event` in which a contact changes its status counts as too inaccurate.
 
     Returns
     -------
@@ -610,6 +619,51 @@ def step(system, state, h, tolerance, fresh, space, work, allowed):
     error = 0.0
     for i in range(6):
         error = max(error, ERROR_FACTOR * h * h * abs(space.b[1, i] - guess[i]))
+    for k in range(system.contacts.shape[0]):
+        for j in range(2):
+            if h > event and space.out[j, k, 19] != state.contacts[k, STATUS]:
+                error = max(error, 1e4 * allowed)
     if error > allowed:
         return OK, error, iteration
     return _accept(system, state, h, space, work), error, iteration
+
+
+@kernel
+def advance(system, state, control, t, end, space, work):
+    """Integrate from `t` to `end` with controlled steps.
+
+    Parameters
+    ----------
+    control : (9,) step wanted, longest step, allowed error, event step, tolerance of Newton's method, step for which the matrix
+        was made (0: none), number of steps, of iterations, of rejected steps; changed
+
+    Returns
+    -------
+    status : OK, or NOT_CONVERGED where no step is short enough
+    t : time reached
+    """
+    while end - t > 1e-12 * max(1.0, end):
+        left = end - t
+        h = left / max(1.0, np.ceil(left / min(control[WANTED], control[LONGEST]) - 1e-9))
+        fresh = abs(h - control[MATRIX]) > 1e-9 * h
+        status, error, iterations = step(
+            system, state, h, control[NEWTON], fresh, space, work, control[ALLOWED], control[EVENT]
+        )
+        control[ITERATIONS] += iterations
+        if status != OK or error > control[ALLOWED]:
+            factor = SHRINK
+            if status == OK:
+                factor = max(SHRINK, SAFETY * (control[ALLOWED] / error) ** 0.25)
+            control[WANTED] = h * factor
+            control[MATRIX] = 0.0
+            control[REJECTED] += 1.0
+            if control[WANTED] < SHORTEST:
+                return NOT_CONVERGED, t
+            continue
+        t += h
+        control[STEPS] += 1.0
+        control[MATRIX] = 0.0 if iterations > 5 else h
+        wanted = h * min(GROW, SAFETY * (control[ALLOWED] / max(error, 1e-300)) ** 0.25)
+        if wanted > 1.3 * h or wanted < h:  # a step kept is a matrix kept
+            control[WANTED] = wanted
+    return OK, end

@@ -1,0 +1,242 @@
+"""The command line: exit status, messages, and the files that a run leaves."""
+
+import json
+import os
+import shutil
+import subprocess
+import sys
+from pathlib import Path
+
+import numpy as np
+import pytest
+from scipy.linalg import expm
+
+from fmus.robot.module import robot_table
+from orchestrator import vocabulary
+from orchestrator.contract import check_variables, is_met
+from orchestrator.results import read_fields, read_table
+
+ROOT = Path(__file__).resolve().parents[1]
+OSCILLATOR = str(ROOT / "scenarios" / "oscillator.toml")
+LANDING = str(ROOT / "scenarios" / "landing_200m_point9.toml")
+COMMAND = [sys.executable, "-m", "orchestrator.cli"]
+
+
+def orchestrate(*arguments: object, timeout: float = 300.0) -> subprocess.CompletedProcess[str]:
+    """Run the command line in a process of its own; there is never a traceback."""
+    command = [*COMMAND, *map(str, arguments)]
+    done = subprocess.run(command, cwd=ROOT, capture_output=True, text=True, timeout=timeout)
+    assert "Traceback" not in done.stderr, done.stderr
+    return done
+
+
+def manifest(directory: Path) -> dict:
+    return json.loads((directory / "manifest.json").read_text())
+
+
+def exact_oscillator(t: np.ndarray) -> np.ndarray:
+    """Positions (2, n) of the two masses of scenarios/oscillator.toml: the exponential of the 4 x 4 matrix."""
+    k, d, kc, dc = 10.0, 0.1, 100.0, 1.0
+    stiffness = np.array([[k + kc, -kc], [-kc, k + kc]])
+    damping = np.array([[d + dc, -dc], [-dc, d + dc]])
+    matrix = np.block([[np.zeros((2, 2)), np.eye(2)], [-stiffness, -damping]])
+    start = np.array([1.0, 0.0, 0.0, 0.0])
+    return np.array([(expm(matrix * time) @ start)[:2] for time in t]).T
+
+
+@pytest.fixture(scope="module")
+def oscillator_run(tmp_path_factory) -> tuple[subprocess.CompletedProcess[str], Path]:
+    out = tmp_path_factory.mktemp("runs") / "oscillator"
+    return orchestrate("run", OSCILLATOR, "--out", out, "--stop", 2), out
+
+
+@pytest.fixture(scope="module")
+def landing_run(tmp_path_factory) -> tuple[subprocess.CompletedProcess[str], Path]:
+    out = tmp_path_factory.mktemp("runs") / "landing"
+    return orchestrate("run", LANDING, "--out", out, "--stop", 0.05, "--quiet"), out
+
+
+def test_help_imports_nothing_heavy():
+    code = "import sys, orchestrator.cli; print(*sys.modules)"
+    done = subprocess.run([sys.executable, "-c", code], cwd=ROOT, capture_output=True, text=True, check=True)
+    assert not {"numpy", "numba", "matplotlib", "fmpy", "pydantic"} & set(done.stdout.split())
+
+
+def test_help_names_every_command():
+    done = orchestrate("--help")
+    assert done.returncode == 0
+    assert all(name in done.stdout for name in ("build", "list", "validate", "check", "run", "compare", "report"))
+
+
+def test_list_shows_scenarios_robots_and_masters():
+    done = orchestrate("list")
+    names = [*vocabulary.robots(), *vocabulary.masters(), *(p.name for p in (ROOT / "scenarios").glob("*.toml"))]
+    assert done.returncode == 0 and all(name in done.stdout for name in names)
+
+
+@pytest.mark.parametrize("command", ["run", "compare", "validate"])
+def test_wrong_input_ends_with_status_2_and_leaves_nothing(command: str, tmp_path: Path):
+    out = tmp_path / "out"
+    options = [] if command == "validate" else ["--out", out]
+    done = orchestrate(command, LANDING, *options, "--set", "robot.parameters.mas=1", "--set", "landing.position=999.0")
+    assert done.returncode == 2 and not out.exists() and done.stdout == ""
+    assert "did you mean mass?" in done.stderr and "off the span" in done.stderr
+
+
+@pytest.mark.parametrize("arguments", [["run"], ["fly"], ["run", OSCILLATOR, "--macro-step", "fast"]])
+def test_wrong_usage_ends_with_status_2(arguments: list[str]):
+    assert orchestrate(*arguments).returncode == 2
+
+
+@pytest.mark.parametrize("command", ["run", "compare"])
+def test_an_existing_output_directory_is_not_touched(command: str, tmp_path: Path):
+    done = orchestrate(command, OSCILLATOR, "--out", tmp_path)
+    assert done.returncode == 2 and "exists already" in done.stderr and list(tmp_path.iterdir()) == []
+
+
+def test_a_run_leaves_its_files(oscillator_run):
+    done, out = oscillator_run
+    assert done.returncode == 0 and f"results in {out}" in done.stdout
+    files = ("results.csv", "iterations.csv", "summary.json", "plots/overview.png", "plots/iterations.png")
+    assert all((out / name).is_file() for name in files)
+    content = manifest(out)
+    assert content["complete"] is True and content["error"] is None
+    assert content["resolved"]["simulation"]["stop_time"] == 2.0
+    assert len(content["fmus"]["left"]["sha256"]) == 64
+    assert not [path for path in out.rglob("*") if path.name.startswith(".")]
+
+
+def test_a_run_meets_the_analytic_solution(oscillator_run):
+    """The scenario's own tolerance, a hundredth of peak-to-peak, holds against the exact solution too."""
+    _, out = oscillator_run
+    table = read_table(out / "results.csv")
+    steps = read_table(out / "iterations.csv")
+    assert next(iter(table)) == "time" and len(steps["time"]) == len(table["time"]) - 1 == 200
+    exact = exact_oscillator(table["time"])
+    assert np.max(np.abs(table["left.position"] - exact[0])) < 1e-2 * np.ptp(exact[0])
+    assert np.max(np.abs(table["right.position"] - exact[1])) < 1e-2 * np.ptp(exact[1])
+
+
+def test_compare_orders_verdict_and_report(tmp_path: Path):
+    out = tmp_path / "comparison"
+    done = orchestrate("compare", OSCILLATOR, "--out", out, "--stop", 1, "--macro-steps", "0.02,0.01", "--quiet")
+    content = json.loads((out / "comparison.json").read_text())
+    assert done.stderr == "" and done.returncode == (0 if content["verdict"] == "pass" else 1)
+    assert [run["macro_step"] for run in content["runs"]] == [0.02, 0.01]
+    assert content["observed_order"]["iqn_ils"]["left.position"] == pytest.approx(2.0, abs=0.2)
+    table = read_table(out / "reference.csv")
+    exact = exact_oscillator(table["time"])
+    estimate = content["reference"]["estimated_error"]["left.position"]
+    assert np.max(np.abs(table["left.position"] - exact[0])) <= estimate
+    assert manifest(out / "iqn_ils_0.01s")["complete"] is True
+    shutil.rmtree(out / "plots")
+    done = orchestrate("report", out)
+    assert done.returncode == 0 and (out / "report.html").is_file() and (out / "plots" / "convergence.png").is_file()
+
+
+def test_a_missed_tolerance_ends_with_status_1(tmp_path: Path):
+    options = ["--stop", 0.5, "--set", "simulation.tolerances.left.position=1e-9"]
+    done = orchestrate("compare", OSCILLATOR, "--out", tmp_path / "out", *options)
+    assert done.returncode == 1 and "FAIL" in done.stdout
+
+
+def test_a_failure_in_mid_run_keeps_the_results(tmp_path: Path):
+    """At 1e308 m/s, without a spring, the position overflows after 1.8 s."""
+    zero = [f"components.{side}.parameters.{key}=0.0" for side in ("left", "right") for key in ("stiffness", "damping")]
+    zero += ["components.right.parameters.coupling_stiffness=0.0", "components.right.parameters.coupling_damping=0.0"]
+    options = [text for key in [*zero, "components.left.parameters.initial_velocity=1e308"] for text in ("--set", key)]
+    out = tmp_path / "out"
+    done = orchestrate("run", OSCILLATOR, "--out", out, "--master", "jacobi", *options)
+    assert done.returncode == 3 and "left" in done.stderr
+    content = manifest(out)
+    assert content["complete"] is False and "left" in content["error"]
+    table = read_table(out / "results.csv")
+    assert 1.5 < table["time"][-1] < 2.0 and np.all(np.isfinite(table["left.position"]))
+
+
+CTRL_C = """
+import os, signal, sys
+from orchestrator import cli, experiment
+run = experiment.run
+press = lambda time: time > 0.5 and os.kill(os.getpid(), signal.SIGINT)
+experiment.run = lambda scenario, progress: run(scenario, press)
+cli.main(sys.argv[1:])
+"""
+
+
+@pytest.mark.skipif(os.name == "nt", reason="no SIGINT for one process there")
+def test_ctrl_c_keeps_the_results(tmp_path: Path):
+    out = tmp_path / "out"
+    command = [sys.executable, "-c", CTRL_C, "run", OSCILLATOR, "--out", str(out), "--quiet"]
+    done = subprocess.run(command, cwd=ROOT, capture_output=True, text=True)
+    assert done.returncode == 130 and "interrupted at t = 0.51 s" in done.stderr and "Traceback" not in done.stderr
+    assert manifest(out)["complete"] is False and manifest(out)["error"] == "interrupted at t = 0.51 s"
+    assert read_table(out / "results.csv")["time"][-1] == pytest.approx(0.51)
+
+
+def test_a_landing_leaves_shape_and_tension(landing_run):
+    done, out = landing_run
+    assert done.returncode == 0 and done.stderr == ""
+    fields, table = read_fields(out / "fields.h5"), read_table(out / "results.csv")
+    n, m = fields["tension"].shape
+    assert fields["position"].shape == (n, m, 3) and n == len(table["time"]) == 11
+    assert np.allclose(fields["position"][:, [0, -1], 2], 0.0, atol=1e-9)  # supports do not move
+    assert not any("_mean" in name or "shape[" in name or "port[2]" in name for name in table)
+    assert (out / "plots" / "shapes.png").is_file()
+
+
+def test_a_robot_is_swapped_with_as_many_contacts_as_wheels(tmp_path: Path):
+    out = tmp_path / "out"
+    done = orchestrate("run", LANDING, "--robot", "hybrid_robot_2", "--out", out, "--stop", 0.01)
+    assert done.returncode == 0
+    assert {"contact1.normal_force", "contact2.normal_force"} <= set(read_table(out / "results.csv"))
+
+
+def test_a_foreign_robot_gives_the_same_as_the_same_one_of_the_catalogue(landing_run, tmp_path: Path):
+    robot = shutil.copy(ROOT / "fmu" / "fptlir.fmu", tmp_path / "mine.fmu")
+    out = tmp_path / "out"
+    done = orchestrate("run", LANDING, "--robot", robot, "--out", out, "--stop", 0.05)
+    assert done.returncode == 0, done.stderr
+    ours, theirs = read_table(landing_run[1] / "results.csv"), read_table(out / "results.csv")
+    assert np.allclose(ours["robot.body.position.z"], theirs["robot.body.position.z"], rtol=0.0, atol=1e-12)
+
+
+def test_an_fmu_that_is_no_robot_is_refused_by_name(landing_run):
+    done = orchestrate("validate", LANDING, "--robot", ROOT / "fmu" / "contact.fmu")
+    assert done.returncode == 2 and "body.position" in done.stderr and "orchestrator check" in done.stderr
+
+
+@pytest.mark.parametrize(("name", "kind"), [("fptlir", "robot"), ("cable", "cable"), ("contact", "contact")])
+def test_check_finds_the_contract_of_our_fmus(landing_run, name: str, kind: str):
+    done = orchestrate("check", ROOT / "fmu" / f"{name}.fmu")
+    assert done.returncode == 0 and f"meets the {kind} contract" in done.stdout
+
+
+def test_check_says_what_a_wrong_fmu_lacks(landing_run):
+    done = orchestrate("check", ROOT / "fmu" / "contact.fmu", "--contract", "robot")
+    assert done.returncode == 1 and "does not meet the robot contract" in done.stdout and "missing" in done.stdout
+
+
+@pytest.mark.parametrize("kind", ["cable", "contact"])
+def test_our_modules_meet_the_contract(kind: str):
+    findings = check_variables(kind, vocabulary.of_module(kind))
+    assert is_met(findings) and all(finding.verdict == "ok" for finding in findings)
+
+
+@pytest.mark.parametrize("n_wheels", [1, 2, 3, 4])
+def test_our_robots_meet_the_contract(n_wheels: int):
+    findings = check_variables("robot", {v.name: v for v in robot_table(n_wheels).variables})
+    assert all(finding.verdict == "ok" for finding in findings)
+
+
+def test_units_and_causalities_are_part_of_the_contract():
+    from dataclasses import replace
+
+    known = {v.name: v for v in robot_table(1).variables}
+    known["roll"] = replace(known["roll"], unit="deg")
+    known["pitch"] = replace(known["pitch"], causality="input")
+    del known["body.velocity.y"]
+    broken = {finding.what: finding.note for finding in check_variables("robot", known) if finding.verdict != "ok"}
+    assert "deg" in broken["output roll"]
+    assert "input" in broken["output pitch"]
+    assert "body.velocity.y" in broken["output body.velocity.{x,y,z}"]
