@@ -118,6 +118,7 @@ class Graph:
     torn : (n_t,) places in `u` that are fed by a component later in the order (or itself): the unknowns of
         implicit masters
     nodes : the components in Gauss–Seidel order
+    feedthrough : component → output → the inputs it depends on without a step, None where the FMU does not say
     observers : are told of every accepted step
     """
 
@@ -134,7 +135,7 @@ class Graph:
                 raise GraphError(f"component {name!r}: names are not empty and have no dot; rename it")
             fmu.name = name
         self._links = _checked_links(self.components, self.connections)
-        feedthrough = _dependencies(self.components, initial=False)
+        self.feedthrough = feedthrough = _dependencies(self.components, initial=False)
         derived = self.order is None
         self.order = (
             _derived_order(self.components, self._links, feedthrough) if derived else self._given_order()

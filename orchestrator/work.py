@@ -80,10 +80,10 @@ class Work:
         for interface, before in zip(self.interfaces, saved[1], strict=True):
             interface.before = before
 
-    def __call__(self, t: float, H: float) -> None:
-        """Book the step from `t` to `t + H`."""
+    def __call__(self, t: float, h: float) -> None:
+        """Book the step from `t` to `t + h`."""
         for i, interface in enumerate(self.interfaces):
-            self.total[i] += interface.work(self.graph.u, H)
+            self.total[i] += interface.work(self.graph.u, h)
 
 
 def _interfaces(graph: Graph, node: Node) -> list[_Interface]:

@@ -2,11 +2,13 @@
 
 from __future__ import annotations
 
+import re
 from typing import TYPE_CHECKING
 
 import numpy as np
 
-from orchestrator.graph import Graph
+from orchestrator.fmu import suffixed
+from orchestrator.graph import Graph, Node
 from orchestrator.masters.base import StepReport, vectors
 
 if TYPE_CHECKING:
@@ -16,14 +18,18 @@ ORDER = 4  # of the `waveform` exchange; a local error of order 5
 SAFETY = 0.25  # a step is made longer when its error would stay below this share of the tolerance
 
 
+# outputs that say something about the step, not about its end
+INTERVAL = re.compile(r"(_mean|\brotation)(\.[xyz])?$")
+
+
 class StepControl:
     """Advances a macro step in sub-steps whose local error is below a tolerance.
 
-    Each sub-step h is made once as a whole and once in two halves; the difference of the outputs, times
-    2^p/(2^p - 1) with p = 4, estimates the local error of the whole, and the halves are kept. Too large: rolled back, h halved. Small enough:
-    h doubled, at most to the macro step, so that whoever records sees the same times as ever. The lengths
-    are powers of two of the macro step because Jacobians and columns serve one length each. (With lengths so
-    coarse a PI controller has nothing to smooth.)
+    Each sub-step h is made once as a whole and once in two halves; the difference of the motions, times 2^p/(2^p - 1)
+    with p = 4, estimates the local error of the whole, and the halves are kept. Too large: rolled back, h halved. Small
+    enough: h doubled, at most to the macro step, so that whoever records sees the same times as ever. The lengths are
+    the macro step over powers of two because Jacobians and columns serve one length each. (With lengths so coarse a PI
+    controller has nothing to smooth.)
 
     Parameters
     ----------
@@ -84,15 +90,20 @@ class StepControl:
 
 
 class Range:
-    """Peak-to-peak of the outputs that are motion: outputs of the components that hold a state between the
-    torn inputs."""
+    """Peak-to-peak of the motions, by which their errors are measured.
+
+    A motion is an output, with a ``_mean`` companion, of a component whose inputs are all torn; if there is
+    none, any output at an instant. Means over the step and rotations within it belong to one length of step
+    and are left out.
+    """
 
     def __init__(self, graph: Graph, absolute: float):
         self.graph, self.absolute = graph, absolute
-        names = [f"{node.name}.{name}" for node in graph.nodes for name in node.outputs.names]
-        moving = [not node.forward.size for node in graph.nodes for _ in node.outputs.names]
-        self.places = np.flatnonzero(moving) if any(moving) else np.arange(len(names))
-        self.vector = vectors([names[i] for i in self.places])
+        pairs = [(node, name) for node in graph.nodes for name in node.outputs.names]
+        instants = [i for i, (_, name) in enumerate(pairs) if not INTERVAL.search(name)]
+        motions = [i for i in instants if _is_motion(graph, *pairs[i])]
+        self.places = np.array(motions or instants, dtype=np.intp)
+        self.vector = vectors([f"{pairs[i][0].name}.{pairs[i][1]}" for i in self.places])
         self.start()
 
     def start(self) -> None:
@@ -111,3 +122,9 @@ class Range:
         np.maximum.at(largest, self.vector, self.high - self.low)
         scale = largest[self.vector] + self.absolute
         return float(np.max(np.abs(difference[self.places]) / scale, initial=0.0))
+
+
+def _is_motion(graph: Graph, node: Node, name: str) -> bool:
+    port = node.fmu.ports[name]
+    moved = set(node.discrete_inputs.names) & (graph.feedthrough[node.name].get(port.variable) or frozenset())
+    return not node.forward.size and not moved and suffixed(name, "_mean") in node.fmu.ports

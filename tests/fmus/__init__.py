@@ -27,11 +27,18 @@ def _folder() -> Path:
 
 @cache
 def build(name: str, *, rollback: bool = True) -> Path:
-    """Build ``NAME_fmu.py`` of this folder, once a process; return the FMU."""
+    """Build ``NAME_fmu.py`` of this folder, once a process (``wave`` from ``link``); return the FMU."""
     folder = _folder() / ("" if rollback else "no_rollback")
     folder.mkdir(exist_ok=True)
+    script = SCRIPTS / f"{name}_fmu.py"
+    if name == "wave":
+        text = (SCRIPTS / "link_fmu.py").read_text(encoding="utf-8")
+        script = folder / script.name
+        script.write_text(
+            text.replace("WAVE = False", "WAVE = True").replace("LinkTest", "WaveTest"), encoding="utf-8"
+        )
     options = {**OPTIONS, "canGetAndSetFMUstate": rollback, "canSerializeFMUstate": rollback}
-    return Path(FmuBuilder.build_FMU(str(SCRIPTS / f"{name}_fmu.py"), dest=str(folder), **options))
+    return Path(FmuBuilder.build_FMU(str(script), dest=str(folder), **options))
 
 
 def fmu(kind: str, name: str, *, rollback: bool = True, **parameters: float | int | str) -> Fmu:
@@ -59,7 +66,7 @@ def oscillator(
     (force-displacement)."""
     a = fmu("link", "a", rollback=rollback, mass=MASS, ground_stiffness=GROUND, initial_position=start[0])
     b = fmu(
-        "link",
+        "wave" if waveform else "link",
         "b",
         mass=MASS,
         ground_stiffness=ground,
@@ -67,7 +74,6 @@ def oscillator(
         stiffness=stiffness,
         damping=damping,
         initial_position=start[1],
-        waveform=float(waveform),
     )
     pairs = [("a.position", "b.left.position"), ("b.left.force", "a.force")]
     if waveform:
@@ -95,13 +101,12 @@ def chain(n: int, *, waveform: bool, stiffness: float = 200.0) -> Graph:
     components, connections = {}, []
     for i in range(n):
         components[f"m{i}"] = fmu(
-            "link",
+            "wave" if waveform else "link",
             f"m{i}",
             mass=1.0,
             ground_stiffness=10.0,
             stiffness=stiffness if i else 0.0,
             initial_position=0.0 if i else 0.1,
-            waveform=float(waveform),
         )
     for i in range(1, n):
         left, right = f"m{i - 1}", f"m{i}"
