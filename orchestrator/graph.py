@@ -144,8 +144,14 @@ class Graph:
         self.nodes = [self._node(name) for name in self.order]
         self.discrete = [n for n in self.nodes if n.discrete_inputs.names or n.discrete_outputs.names]
         self.stages, _ = self._stages(feedthrough)
-        for node in {node.name: node for stage in self.stages[1:] for node in stage}.values():
-            node.feedthrough = True
+        read_late = {node.name for stage in self.stages[1:] for node in stage}
+        for node in self.nodes:
+            node.feedthrough = any(
+                deps is None or deps & {node.fmu.ports[name].variable for name in node.inputs.names}
+                for deps in feedthrough[node.name].values()
+            )
+        # outputs that feed nothing may depend on inputs too, and are recorded
+        self.leaves = [node for node in self.nodes if node.feedthrough and node.name not in read_late]
         self.initial_stages, self._loop = self._stages(_dependencies(self.components, initial=True))
 
     def _given_order(self) -> tuple[str, ...]:
@@ -271,6 +277,8 @@ class Graph:
                     node.inputs.set()
                 node.outputs.get_finite()
         self.gather()
+        for node in self.leaves:
+            node.inputs.set()
 
     def initialize(self, start: float, stop: float | None = None) -> None:
         """Initialise all FMUs consistently: values go along the connections, algebraic loops are solved."""
