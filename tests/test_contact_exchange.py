@@ -80,7 +80,7 @@ def sampled(contact, start, inputs, h, m=8):
     exchange.motion_at(path, 0.0, h, motions[0])
     contact_wrench(contact._prm, motions[0], z, first)
     status, lost = exchange.sample_law(
-        contact._prm, path, h, nodes, weights, increments, end, z, False, motions, samples
+        contact._prm, path, h, nodes, weights, increments, end, z, motions, samples
     )
     assert status == 0
     return nodes, weights, motions, samples, lost, first[25] + first[26]

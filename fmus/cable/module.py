@@ -148,6 +148,7 @@ class Cable:
         self._alpha = generalized_alpha(self["spectral_radius"])
         self._use_alpha = self["integrator"] == 1.0
         self._work = dynamics.make_work(n, self.state.size)
+        dynamics.factorise_mass(self.model, q, self._work)
         self.show()
         self._shown_ports[:, 12:18] = self._shown_ports[:, :6]
         self._shown_ports[:, 18] = 0.0
@@ -211,7 +212,8 @@ class Cable:
         if np.any(self._ports[:, 0] < 0.0) or np.any(self._ports[:, 0] > self.model.s[-1]):
             k = int(np.argmax((self._ports[:, 0] < 0.0) | (self._ports[:, 0] > self.model.s[-1])))
             raise ModuleError(
-                f"cable: port[{k + 1}].s = {self._ports[k, 0]:g} m is off the cable (0 to {self.model.s[-1]:g} m)"
+                f"cable: port[{k + 1}].s = {self._ports[k, 0]:g} m is off the cable (0 to {self.model.s[-1]:g} m) at "
+                f"t = {t:g} s: the wheel has run past a support; stop the run earlier, or brake the robot"
             )
         status = dynamics.step_and_show(
             self.model,

@@ -189,8 +189,11 @@ def _advance_bristle(prm, motion, trial, sample, z, slides):
 
 
 @kernel
-def sample_law(prm, path, h, nodes, weights, increments, end, z, slides, motions, samples):
+def sample_law(prm, path, h, nodes, weights, increments, end, z, motions, samples):
     """Sample the law along a path and at the end motion.
+
+    What friction dissipates is its work, in the same quadrature as the forces' work, less what the bristle stores: the
+    books balance whether it sticks or slides.
 
     Parameters
     ----------
@@ -198,7 +201,6 @@ def sample_law(prm, path, h, nodes, weights, increments, end, z, slides, motions
     nodes, weights, increments : of `gauss_rule(m)`
     end : (24,) motion at the end of the step
     z : (2,) bristle at the start; becomes that at the end
-    slides : whether it slides at the start
     motions, samples : (m + 1, 24) and (m + 1, 32), written
 
     Returns
@@ -214,6 +216,7 @@ def sample_law(prm, path, h, nodes, weights, increments, end, z, slides, motions
         status = walls(prm, motions[i], samples[i])
         if status != OK:
             return status, 0.0
+    bristle = 0.5 * prm[9] * (z[0] ** 2 + z[1] ** 2)
     dissipated = 0.0
     trial = samples[m, 27:29]
     for i in range(m + 1):
@@ -222,12 +225,12 @@ def sample_law(prm, path, h, nodes, weights, increments, end, z, slides, motions
             trial[0] += h * increments[i, j] * samples[j, 16]
             trial[1] += h * increments[i, j] * samples[j, 17]
         row = samples[i]
-        dissipated += _advance_bristle(prm, motions[i], trial, row, z, slides)
-        slides = row[19] == SLIP
+        friction(prm, motions[i], trial, row)
+        z[0], z[1] = row[21], row[22]
         if i < m:
-            viscous = -row[16] * (row[13] + prm[9] * z[0]) - row[17] * (row[14] + prm[9] * z[1])
-            dissipated += h * weights[i] * (row[23] + viscous)
-    return OK, dissipated
+            # what friction does on both bodies, at the points where its force is sampled
+            dissipated += h * weights[i] * (row[23] - row[13] * row[16] - row[14] * row[17])
+    return OK, dissipated + bristle - samples[m, 26]
 
 
 @kernel
@@ -327,7 +330,7 @@ def _write_point(sample, outputs):
 
 
 @kernel
-def _silence(sample):
+def silence(sample):
     """Clear all forces and energies of a sample: the cable has left the groove."""
     for i in range(15):
         sample[i] = 0.0
@@ -362,7 +365,7 @@ def refresh(prm, inputs, state, motions, samples, outputs):
     slip[1] += state[BRISTLE + 1]
     friction(prm, end, slip, row)
     if state[GONE] != 0.0:
-        _silence(row)
+        silence(row)
     _write_point(row, outputs)
     write_instant(row, outputs)
     write_memory(state, outputs)
@@ -415,7 +418,7 @@ def step(prm, method, inputs, h, nodes, weights, increments, state, path, motion
         else:
             hermite_path(start, inputs, h, path)
         status, dissipated = sample_law(
-            prm, path, h, nodes, weights, increments, end, z, slides, motions, samples
+            prm, path, h, nodes, weights, increments, end, z, motions, samples
         )
     if status != OK:
         return status
@@ -423,7 +426,7 @@ def step(prm, method, inputs, h, nodes, weights, increments, state, path, motion
         project_force(samples, nodes, weights, h, outputs)
 
     if state[GONE] != 0.0:
-        _silence(last)
+        silence(last)
         _write_point(last, outputs)
         z[0] = z[1] = dissipated = 0.0
     work_cable = _work(path, 0, h, outputs, O_CABLE)
@@ -439,7 +442,7 @@ def step(prm, method, inputs, h, nodes, weights, increments, state, path, motion
     if state[GONE] == 0.0 and (last[19] == LEFT or _passed_axle(start, end)):
         # what the walls and the bristle had stored is not given back
         state[GONE] = 1.0
-        _silence(last)
+        silence(last)
         z[0] = z[1] = 0.0
         dissipated = state[STORED] - work_cable - work_wheel
     state[STORED] = last[25] + last[26]

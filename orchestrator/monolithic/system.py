@@ -18,6 +18,7 @@ from fmus import banded
 from fmus.cable.assembly import HALF_BANDWIDTH, Model, constrain_vector, interpolate, iteration_matrix, locate
 from fmus.cable.dynamics import DISSIPATED, LAST_INNER, residual
 from fmus.contact import law
+from fmus.contact.exchange import silence
 from fmus.jit import kernel
 from fmus.robot import rigid_body as rb
 from fmus.rotations import from_rotation_vector, multiply, normalize
@@ -25,14 +26,17 @@ from fmus.time_integration import Collocation
 
 N_ROBOT = 10
 """Accelerations of the robot: centre of mass 3, angular velocity 3, spin of four wheels."""
-S, SLIP, WALLS, FRICTION, LEFT, STATUS = 0, 1, 3, 4, 5, 6
-N_CONTACT = 7
-"""Memory of a contact: arc length, bristle (2), energy dissipated by walls and by friction, left the groove, status."""
+S, SLIP, WALLS, FRICTION, LEFT, STATUS, STORED = 0, 1, 3, 4, 5, 6, 7
+N_CONTACT = 8
+"""Memory of a contact: arc length, bristle (2), energy dissipated by walls and by friction, left the groove, status,
+elastic energy of the walls at the end of the last step."""
+FOOT_ITERATIONS = 2
+"""From the last iterate; each one shrinks the error by the cable's curvature times the wheel's distance, 1e-2 or less."""
 MAX_ITERATIONS = 15
 SLOW = 0.2
 ERROR_FACTOR = 0.01
 """Local error of a step over h² times the change of the robot's accelerations against those predicted."""
-OK, NOT_CONVERGED, CONTACT_FAILED = 0, 1, 2
+OK, NOT_CONVERGED, CONTACT_FAILED, OFF_CABLE = 0, 1, 2, 3
 SAFETY, GROW, SHRINK = 0.8, 2.0, 0.2
 SHORTEST = 1e-7
 """s; a shorter step means that the equations cannot be solved."""
@@ -58,7 +62,7 @@ class System(NamedTuple):
 
 
 class State(NamedTuple):
-    """What changes: cable (its module's flat state), robot (21,), its stage accelerations (2, 10), contacts (n_wheels, 7)."""
+    """What changes: cable (its module's flat state), robot (21,), accelerations (2, 10), contacts (n_wheels, 8)."""
 
     cable: np.ndarray
     robot: np.ndarray
@@ -97,6 +101,7 @@ class Space(NamedTuple):
     robot_mode: np.ndarray  # (10,) complex
     guess: np.ndarray  # (10,) accelerations of the robot predicted for the second stage
     elongation: np.ndarray  # (n_wheels, 2) of the bristles where the matrix is made
+    arc: np.ndarray  # (2, n_wheels) arc lengths of the wheels' feet at the stages
 
 
 def make_space(n: int, n_wheels: int) -> Space:
@@ -110,7 +115,7 @@ def make_space(n: int, n_wheels: int) -> Space:
         z(rb.RIGID), z((n_wheels, 12)), z(rb.BODY_LOADS + rb.WHEEL_LOADS * n_wheels), z(10), z((3, 4)),
         z((n_wheels, 8)), z(n_wheels, dtype=np.int64), z((N_ROBOT, n), dtype=c), z((n_wheels, N_ROBOT, 12), dtype=c),
         z((N_ROBOT, N_ROBOT), dtype=c), z(N_ROBOT, dtype=np.int64), z(N_ROBOT, dtype=c),
-        z(N_ROBOT), z((n_wheels, 2)),
+        z(N_ROBOT), z((n_wheels, 2)), z((2, n_wheels)),
     )  # fmt: skip
 
 
@@ -199,27 +204,51 @@ def _loads(system, robot, points, slips, contacts, outs, generalized, space):
         rb.wheel_motion(system.robot, robot, k, motion[12:24])
         out = outs[k]
         law.friction(system.contacts[k], motion, slips[k], out)
-        active = 0.0 if contacts[k, LEFT] > 0.0 else 1.0
+        if contacts[k, LEFT] > 0.0:
+            silence(out)
         g = motion[3:6]
         square = g[0] * g[0] + g[1] * g[1] + g[2] * g[2]
         for i in range(3):
-            generalized[6 * k + i] = active * out[i]
-        generalized[6 * k + 3] = active * (out[4] * g[2] - out[5] * g[1]) / square
-        generalized[6 * k + 4] = active * (out[5] * g[0] - out[3] * g[2]) / square
-        generalized[6 * k + 5] = active * (out[3] * g[1] - out[4] * g[0]) / square
+            generalized[6 * k + i] = out[i]
+        generalized[6 * k + 3] = (out[4] * g[2] - out[5] * g[1]) / square
+        generalized[6 * k + 4] = (out[5] * g[0] - out[3] * g[2]) / square
+        generalized[6 * k + 5] = (out[3] * g[1] - out[4] * g[0]) / square
         for i in range(6):
-            space.loads[rb.BODY_LOADS + rb.WHEEL_LOADS * k + i] += active * out[6 + i]
+            space.loads[rb.BODY_LOADS + rb.WHEEL_LOADS * k + i] += out[6 + i]
     force, moment, torque = space.resultants[0:3], space.resultants[3:6], space.resultants[6:10]
     rb.resultants(system.robot, robot, space.loads, force, moment, torque)
     rb.accelerations(system.robot, robot, force, moment, torque, generalized[6 * n_wheels :])
 
 
 @kernel
-def _cable_points(system, q, v, contacts, points, shape):
-    """Write p, t, dp, dt of every contact to `points` (n_wheels, 12)."""
-    for k in range(contacts.shape[0]):
-        interpolate(system.model, q, contacts[k, S], shape, points[k, 0:6])
-        interpolate(system.model, v, contacts[k, S], shape, points[k, 6:12])
+def _cable_points(system, q, v, arcs, points, shape):
+    """Write p, t, dp, dt of every contact, at the arc lengths `arcs`, to `points` (n_wheels, 12)."""
+    for k in range(arcs.size):
+        interpolate(system.model, q, arcs[k], shape, points[k, 0:6])
+        interpolate(system.model, v, arcs[k], shape, points[k, 6:12])
+
+
+@kernel
+def _follow(system, q, robot, arcs, space, shape):
+    """Move every arc length in `arcs` (n_wheels,) to the foot of its wheel on the cable; return OK or OFF_CABLE.
+
+    The law takes the cable for a straight line. At the foot itself that costs nothing; at a distance x from it, it would be
+    wrong by curvature x²/2, which in every step would add that times the contact force to the energy.
+    """
+    motion, status = space.motion, OK
+    for k in range(arcs.size):
+        rb.wheel_motion(system.robot, robot, k, motion[12:24])
+        for _ in range(FOOT_ITERATIONS):
+            interpolate(system.model, q, arcs[k], shape, motion[0:6])
+            along = square = 0.0
+            for i in range(3):
+                along += (motion[12 + i] - motion[i]) * motion[3 + i]
+                square += motion[3 + i] * motion[3 + i]
+            foot = arcs[k] + along / square
+            if not 0.0 <= foot <= system.model.s[-1]:
+                status = OFF_CABLE
+            arcs[k] = min(max(foot, 0.0), system.model.s[-1])
+    return status
 
 
 @kernel
@@ -321,18 +350,18 @@ def _solve_dense(a, pivots, x):
 
 
 @kernel
-def _matrix(system, robot, q, v, contacts, h, space, work):
+def _matrix(system, robot, q, v, contacts, arcs, h, space, work):
     """Make and factorise Newton's matrix at the given state; return the status."""
     model, n_wheels = system.model, system.contacts.shape[0]
     first = 6 * n_wheels
     z = h * system.method.eigenvalue
-    _cable_points(system, q, v, contacts, space.cable_point, work.shape)
+    _cable_points(system, q, v, arcs, space.cable_point, work.shape)
     if _interface_tangent(system, robot, space.cable_point, space.elongation, contacts, space) != OK:
         return CONTACT_FAILED
     iteration_matrix(model, q, v, 1.0 + 0.0j, z, z * z, work.band, work.matrix, work.element)
     space.coupling[:, :] = 0.0
     for k in range(n_wheels):
-        o = 6 * locate(model, contacts[k, S], space.shapes[k])
+        o = 6 * locate(model, arcs[k], space.shapes[k])
         space.offsets[k] = o
         shape = space.shapes[k]
         for a in range(4):
@@ -399,7 +428,8 @@ def _residuals(system, state, h, space, work):
                 method.c[j] * v0[i] + h * (method.aa[j, 0] * work.a[0, i] + method.aa[j, 1] * work.a[1, i])
             )
             work.v[j, i] = v0[i] + h * (method.a[j, 0] * work.a[0, i] + method.a[j, 1] * work.a[1, i])
-        _cable_points(system, work.q[j], work.v[j], state.contacts, space.cable_point, work.shape)
+        _follow(system, work.q[j], space.stage[j], space.arc[j], space, work.shape)
+        _cable_points(system, work.q[j], work.v[j], space.arc[j], space.cable_point, work.shape)
         if _walls(system, space.stage[j], space.cable_point, space.out[j], space) != OK:
             return CONTACT_FAILED
         for k in range(n_wheels):
@@ -409,7 +439,7 @@ def _residuals(system, state, h, space, work):
             for i in range(2):
                 path = method.a[j, 0] * space.slip[0, k, i] + method.a[j, 1] * space.slip[1, k, i]
                 space.trial[k, i] = state.contacts[k, SLIP + i] + h * path
-        _cable_points(system, work.q[j], work.v[j], state.contacts, space.cable_point, work.shape)
+        _cable_points(system, work.q[j], work.v[j], space.arc[j], space.cable_point, work.shape)
         _loads(
             system,
             space.stage[j],
@@ -422,7 +452,7 @@ def _residuals(system, state, h, space, work):
         )
         work.external[:] = 0.0
         for k in range(n_wheels):
-            o = 6 * locate(model, state.contacts[k, S], work.shape)
+            o = 6 * locate(model, space.arc[j, k], work.shape)
             for a in range(4):
                 for i in range(3):
                     work.external[o + 3 * a + i] += (
@@ -486,6 +516,8 @@ def _predict(system, state, h, space, work):
             work.a[j, i] = a[0, i] + at * (a[1, i] - a[0, i])
         for i in range(N_ROBOT):
             space.b[j, i] = state.accelerations[0, i] + at * (state.accelerations[1, i] - state.accelerations[0, i])
+        for k in range(state.contacts.shape[0]):
+            space.arc[j, k] = state.contacts[k, S]
 
 
 @kernel
@@ -540,29 +572,43 @@ def _accept_contacts(system, state, h, space, work):
 
 @kernel
 def settle(system, state, move, space, work):
-    """Evaluate the contacts at the present state, limit their bristles, and move their arc lengths to the wheels.
+    """Evaluate the contacts at the present state; with `move` also limit their bristles and follow the wheels.
 
-    With `move` false only the law is evaluated. The results stay in ``space.out[0]``.
+    The results stay in ``space.out[0]``.
     """
     n = system.model.weight.size
-    q, v = state.cable[:n], state.cable[n : 2 * n]
-    _cable_points(system, q, v, state.contacts, space.cable_point, work.shape)
+    q, v, arcs = state.cable[:n], state.cable[n : 2 * n], space.arc[0]
+    for k in range(arcs.size):
+        arcs[k] = state.contacts[k, S]
+        space.trial[k, 0], space.trial[k, 1] = state.contacts[k, SLIP], state.contacts[k, SLIP + 1]
+    status = _follow(system, q, state.robot, arcs, space, work.shape) if move else OK
+    _cable_points(system, q, v, arcs, space.cable_point, work.shape)
     if _walls(system, state.robot, space.cable_point, space.out[0], space) != OK:
         return CONTACT_FAILED
-    for k in range(system.contacts.shape[0]):
-        space.trial[k, 0], space.trial[k, 1] = state.contacts[k, SLIP], state.contacts[k, SLIP + 1]
     _loads(system, state.robot, space.cable_point, space.trial, state.contacts, space.out[0], space.generalized, space)
-    for k in range(system.contacts.shape[0]):
+    for k in range(arcs.size):
         state.contacts[k, STATUS] = space.out[0, k, 19]
     if move:
-        for k in range(system.contacts.shape[0]):
-            out, memory = space.out[0, k], state.contacts[k]
-            memory[SLIP], memory[SLIP + 1] = out[21], out[22]
-            memory[FRICTION] -= out[26]
-            if out[19] == law.LEFT:
-                memory[LEFT] = 1.0
-            memory[S] = min(max(memory[S] + out[20], 0.0), system.model.s[-1])
-    return OK
+        for k in range(arcs.size):
+            _remember(state.contacts[k], space.out[0, k], arcs[k])
+    return status
+
+
+@kernel
+def _remember(memory, out, arc):
+    """Renew the memory of a contact from the law's results at the end of a step.
+
+    What the walls had stored when the cable left the groove is not given back.
+    """
+    memory[SLIP], memory[SLIP + 1] = out[21], out[22]
+    memory[FRICTION] -= out[26]
+    if memory[LEFT] > 0.0:
+        return
+    if out[19] == law.LEFT:
+        memory[LEFT] = 1.0
+        memory[WALLS] += memory[STORED]
+    memory[STORED] = out[25]
+    memory[S] = arc
 
 
 @kernel
@@ -586,7 +632,8 @@ def step(system, state, h, tolerance, fresh, space, work, allowed, event):
         for k in range(system.contacts.shape[0]):
             for i in range(2):
                 space.elongation[k, i] = state.contacts[k, SLIP + i]
-        status = _matrix(system, state.robot, state.cable[:n], state.cable[n : 2 * n], state.contacts, h, space, work)
+        q, v = state.cable[:n], state.cable[n : 2 * n]
+        status = _matrix(system, state.robot, q, v, state.contacts, space.arc[1], h, space, work)
         if status != OK:
             return status, 0.0, 0
     previous, iteration = np.inf, 0
@@ -609,7 +656,8 @@ def step(system, state, h, tolerance, fresh, space, work, allowed, event):
             for k in range(system.contacts.shape[0]):
                 for i in range(2):
                     space.elongation[k, i] = space.trial[k, i]
-            status = _matrix(system, space.stage[1], work.q[1], work.v[1], state.contacts, h, space, work)
+            q, v = work.q[1], work.v[1]
+            status = _matrix(system, space.stage[1], q, v, state.contacts, space.arc[1], h, space, work)
             if status != OK:
                 return status, 0.0, iteration
         previous = change
@@ -634,12 +682,12 @@ def advance(system, state, control, t, end, space, work):
 
     Parameters
     ----------
-    control : (9,) step wanted, longest step, allowed error, event step, tolerance of Newton's method, step for which the matrix
-        was made (0: none), number of steps, of iterations, of rejected steps; changed
+    control : (9,) step wanted, longest step, allowed error, event step, tolerance of Newton's method, step of the
+        matrix (0: none), number of steps, of iterations, of rejected steps; changed
 
     Returns
     -------
-    status : OK, or NOT_CONVERGED where no step is short enough
+    status : OK, NOT_CONVERGED where no step is short enough, or OFF_CABLE
     t : time reached
     """
     while end - t > 1e-12 * max(1.0, end):
@@ -650,6 +698,8 @@ def advance(system, state, control, t, end, space, work):
             system, state, h, control[NEWTON], fresh, space, work, control[ALLOWED], control[EVENT]
         )
         control[ITERATIONS] += iterations
+        if status == OFF_CABLE:
+            return OFF_CABLE, t
         if status != OK or error > control[ALLOWED]:
             factor = SHRINK
             if status == OK:
