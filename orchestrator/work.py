@@ -37,10 +37,10 @@ class _Interface:
         """Return the work of the step that has just been made, J."""
         self.motion.get()
         x1, x0 = self.motion.values, self.before
-        total = float(u[self.loads] @ (x1 - x0))
+        total = u.take(self.loads).dot(x1 - x0)
         if self.mean is not None and self.rates.size:
             self.mean.get()
-            total += float(u[self.rates] @ (H / 2 * (x0 + x1) - H * self.mean.values))
+            total += u.take(self.rates).dot(H / 2 * (x0 + x1) - H * self.mean.values)
         if self.relative:
             self.before = x1.copy()
         return total
