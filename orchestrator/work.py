@@ -37,10 +37,10 @@ class _Interface:
         """Return the work of the step that has just been made, J."""
         self.motion.get()
         x1, x0 = self.motion.values, self.before
-        total = float(u[self.loads] @ (x1 - x0))
+        total = u.take(self.loads).dot(x1 - x0)
         if self.mean is not None and self.rates.size:
             self.mean.get()
-            total += float(u[self.rates] @ (H / 2 * (x0 + x1) - H * self.mean.values))
+            total += u.take(self.rates).dot(H / 2 * (x0 + x1) - H * self.mean.values)
         if self.relative:
             self.before = x1.copy()
         return total
@@ -70,10 +70,20 @@ class Work:
                 interface.motion.values.copy() if interface.relative else np.zeros(interface.loads.size)
             )
 
-    def __call__(self, t: float, H: float) -> None:
-        """Book the step from `t` to `t + H`."""
+    def save(self) -> tuple[np.ndarray, list[np.ndarray]]:
+        """Return what `restore` needs."""
+        return self.total.copy(), [interface.before for interface in self.interfaces]
+
+    def restore(self, saved: tuple[np.ndarray, list[np.ndarray]]) -> None:
+        """Go back: the steps booked since are not made."""
+        self.total[:] = saved[0]
+        for interface, before in zip(self.interfaces, saved[1], strict=True):
+            interface.before = before
+
+    def __call__(self, t: float, h: float) -> None:
+        """Book the step from `t` to `t + h`."""
         for i, interface in enumerate(self.interfaces):
-            self.total[i] += interface.work(self.graph.u, H)
+            self.total[i] += interface.work(self.graph.u, h)
 
 
 def _interfaces(graph: Graph, node: Node) -> list[_Interface]:
