@@ -184,6 +184,32 @@ def compare(
 
 
 @app.command()
+def modes(
+    scenario: ScenarioFile,
+    count: Annotated[int, typer.Option(help="Number of modes out of the vertical plane, and in it.")] = 6,
+    out: Annotated[Path | None, typer.Option(help="Directory for table and picture; it must not exist.")] = None,
+    set_: Set = None,
+) -> None:
+    """Natural frequencies, damping ratios and shapes of the scenario's cable about its static equilibrium."""
+    from rich.table import Table
+
+    from orchestrator import modes as vibration
+
+    loaded = _load(scenario, None, set_)
+    path = None if out is None else _free(out, loaded.name)
+    found = vibration.of_scenario(loaded, count)
+    table = Table("mode", "out of plane \\[Hz]", "damping", "in plane \\[Hz]", "damping", box=None, pad_edge=False)
+    groups = (found.out_of_plane, found.in_plane)
+    for k in range(max(group.frequency.size for group in groups)):
+        cells = [(f"{g.frequency[k]:.6g}", f"{g.damping_ratio[k]:.3g}") if k < g.frequency.size else ("", "") for g in groups]
+        table.add_row(str(k + 1), *cells[0], *cells[1])
+    _print(table)
+    if path is not None:
+        vibration.write(found, path)
+        print(f"table and picture in {path}")
+
+
+@app.command()
 def report(
     directory: Annotated[Path, typer.Argument(metavar="DIR", help="Directory of a finished run.")],
 ) -> None:
