@@ -7,8 +7,9 @@ iteration of a macro step.
 
 from __future__ import annotations
 
-from collections.abc import Callable, Iterable, Mapping, Sequence
+from collections.abc import Iterable, Mapping, Sequence
 from dataclasses import dataclass, field
+from typing import Any, Protocol
 
 import numpy as np
 from fmpy.model_description import Unit
@@ -32,6 +33,19 @@ class Connection:
 
     source: str
     target: str
+
+
+class Observer(Protocol):
+    """Is told of every accepted step, and can go back when the step is rolled back after all."""
+
+    def __call__(self, t: float, h: float) -> None:
+        """All components went from `t` to `t + h`; the inputs of that step are still in `Graph.u`."""
+
+    def save(self) -> Any:
+        """Return what `restore` needs."""
+
+    def restore(self, saved: Any) -> None:
+        """Go back to what was saved."""
 
 
 @dataclass
@@ -66,7 +80,7 @@ class Node:
 
     def receive(self, y: np.ndarray) -> None:
         """Take the inputs that are not torn from the outputs `y`."""
-        np.take(y, self.forward, out=self.forward_values, mode="clip")
+        y.take(self.forward, out=self.forward_values, mode="clip")
         if self.gain is not None and self.offset is not None:
             np.multiply(self.forward_values, self.gain, out=self.forward_values)
             np.add(self.forward_values, self.offset, out=self.forward_values)
@@ -104,14 +118,14 @@ class Graph:
     torn : (n_t,) places in `u` that are fed by a component later in the order (or itself): the unknowns of
         implicit masters
     nodes : the components in Gauss–Seidel order
-    observers : called as f(t, h) after every accepted step of all components, inputs of that step still in
-        `u`
+    feedthrough : component → output → the inputs it depends on without a step, None where the FMU does not say
+    observers : are told of every accepted step
     """
 
     components: Mapping[str, Fmu]
     connections: Iterable[Connection]
     order: Sequence[str] | None = None
-    observers: list[Callable[[float, float], None]] = field(default_factory=list)
+    observers: list[Observer] = field(default_factory=list)
 
     def __post_init__(self) -> None:
         self.components = dict(self.components)
@@ -121,7 +135,7 @@ class Graph:
                 raise GraphError(f"component {name!r}: names are not empty and have no dot; rename it")
             fmu.name = name
         self._links = _checked_links(self.components, self.connections)
-        feedthrough = _dependencies(self.components, initial=False)
+        self.feedthrough = feedthrough = _dependencies(self.components, initial=False)
         derived = self.order is None
         self.order = (
             _derived_order(self.components, self._links, feedthrough) if derived else self._given_order()
@@ -130,8 +144,14 @@ class Graph:
         self.nodes = [self._node(name) for name in self.order]
         self.discrete = [n for n in self.nodes if n.discrete_inputs.names or n.discrete_outputs.names]
         self.stages, _ = self._stages(feedthrough)
-        for node in {node.name: node for stage in self.stages[1:] for node in stage}.values():
-            node.feedthrough = True
+        read_late = {node.name for stage in self.stages[1:] for node in stage}
+        for node in self.nodes:
+            node.feedthrough = any(
+                deps is None or deps & {node.fmu.ports[name].variable for name in node.inputs.names}
+                for deps in feedthrough[node.name].values()
+            )
+        # outputs that feed nothing may depend on inputs too, and are recorded
+        self.leaves = [node for node in self.nodes if node.feedthrough and node.name not in read_late]
         self.initial_stages, self._loop = self._stages(_dependencies(self.components, initial=True))
 
     def _given_order(self) -> tuple[str, ...]:
@@ -211,7 +231,7 @@ class Graph:
 
     def gather(self) -> None:
         """Move all continuous outputs to the inputs: u from y."""
-        np.take(self.y, self.source, out=self.u, mode="clip")
+        self.y.take(self.source, out=self.u, mode="clip")
         if self.gain is not None and self.offset is not None:
             np.multiply(self.u, self.gain, out=self.u)
             np.add(self.u, self.offset, out=self.u)
@@ -231,7 +251,7 @@ class Graph:
             return
         for node in self.discrete:
             node.discrete_outputs.get_finite()
-        np.take(self.e, self.discrete_source, out=self.d, mode="clip")
+        self.e.take(self.discrete_source, out=self.d, mode="clip")
         if self.discrete_gain is not None and self.discrete_offset is not None:
             self.d[:] = self.d * self.discrete_gain + self.discrete_offset
         for node in self.discrete:
@@ -257,6 +277,8 @@ class Graph:
                     node.inputs.set()
                 node.outputs.get_finite()
         self.gather()
+        for node in self.leaves:
+            node.inputs.set()
 
     def initialize(self, start: float, stop: float | None = None) -> None:
         """Initialise all FMUs consistently: values go along the connections, algebraic loops are solved."""

@@ -70,10 +70,20 @@ class Work:
                 interface.motion.values.copy() if interface.relative else np.zeros(interface.loads.size)
             )
 
-    def __call__(self, t: float, H: float) -> None:
-        """Book the step from `t` to `t + H`."""
+    def save(self) -> tuple[np.ndarray, list[np.ndarray]]:
+        """Return what `restore` needs."""
+        return self.total.copy(), [interface.before for interface in self.interfaces]
+
+    def restore(self, saved: tuple[np.ndarray, list[np.ndarray]]) -> None:
+        """Go back: the steps booked since are not made."""
+        self.total[:] = saved[0]
+        for interface, before in zip(self.interfaces, saved[1], strict=True):
+            interface.before = before
+
+    def __call__(self, t: float, h: float) -> None:
+        """Book the step from `t` to `t + h`."""
         for i, interface in enumerate(self.interfaces):
-            self.total[i] += interface.work(self.graph.u, H)
+            self.total[i] += interface.work(self.graph.u, h)
 
 
 def _interfaces(graph: Graph, node: Node) -> list[_Interface]:
