@@ -243,13 +243,55 @@ def bounce(step: float, **law: float) -> np.ndarray:
     return run(graph, 0.16, step, ["a.position", "a.velocity"], tolerance=1e-12).values[-1]
 
 
-@pytest.mark.parametrize(("exponent", "stiffness"), [(1.5, 3e4), (2.5, 3e5)])
-def test_order_across_touch_and_lift_off(exponent, stiffness):
-    """The events fall anywhere in the step; mean of the slopes over three halvings, since where they fall varies."""
+@pytest.mark.parametrize(("exponent", "stiffness", "order"), [(1.0, 1e4, 1.8), (1.5, 3e4, 2.3), (2.5, 3e5, 3.5)])
+def test_order_across_touch_and_lift_off(exponent, stiffness, order):
+    """The events fall anywhere in the step; slope over eight steps. With exact integrals the order is 4; the Gauss rule
+    across the kink leaves a small part of order exponent + 1 (docs/exchange.md), which is the bound."""
 
     def right(t, y):
         return y[1], -1e3 * y[0] - stiffness * max(y[0], 0.0) ** exponent
 
     exact = solve_ivp(right, (0.0, 0.16), [-0.12, 0.0], rtol=1e-12, atol=1e-14, max_step=1e-4, method="DOP853").y[:, -1]
-    errors = [abs(bounce(h, stiffness=stiffness, exponent=exponent)[0] - exact[0]) for h in (0.008, 0.004, 0.002, 0.001)]
-    assert math.log2(errors[0] / errors[-1]) / 3.0 > 3.5
+    steps = 0.16 / np.array([20, 28, 40, 56, 80, 113, 160, 226])
+    errors = [abs(bounce(step, stiffness=stiffness, exponent=exponent)[0] - exact[0]) for step in steps]
+    assert np.polyfit(np.log(steps), np.log(errors), 1)[0] > order
+
+
+BRISTLE, LIMIT = 4e3, 8.0
+
+
+def stick_slip(time: float) -> np.ndarray:
+    """Return x, v of a unit mass on a ground spring and a bristle that gives way at its limit, event by event."""
+    y, t, z, slips = np.array([0.02, 0.0]), 0.0, 0.0, False
+    while t < time - 1e-12:
+        x0, z0 = y[0], z
+        side = math.copysign(1.0, y[1] or -y[0])
+
+        def right(_, y, slips=slips, x0=x0, z0=z0):
+            return y[1], -1e3 * y[0] - BRISTLE * (z0 if slips else z0 + y[0] - x0)
+
+        def full(_, y, x0=x0, z0=z0):
+            return BRISTLE * abs(z0 + y[0] - x0) - LIMIT
+
+        def halt(_, y, side=side):
+            return side * y[1]
+
+        event = halt if slips else full
+        event.terminal, event.direction = True, -1.0 if slips else 1.0
+        piece = solve_ivp(right, (t, time), y, events=event, rtol=1e-12, atol=1e-15, method="DOP853", max_step=1e-3)
+        t, y = piece.t[-1], piece.y[:, -1]
+        if not slips:
+            z = z0 + y[0] - x0
+        slips = not slips
+    return y
+
+
+def test_order_across_stick_and_slip():
+    """Every half swing sticks, slips and sticks again inside macro steps; the force has a kink there, as at exponent 1."""
+    exact = stick_slip(0.16)
+    steps, errors = 0.16 / np.array([20, 28, 40, 56, 80, 113, 160, 226]), []
+    for step in steps:
+        mass = {"mass": 1.0, "ground_stiffness": 1e3, "initial_position": 0.02}
+        graph = system({"a": mass}, {"stiffness": 0.0, "tangential": BRISTLE, "limit": LIMIT})
+        errors.append(abs(run(graph, 0.16, step, ["a.position"], tolerance=1e-12).values[-1, 0] - exact[0]))
+    assert np.polyfit(np.log(steps), np.log(errors), 1)[0] > 1.8
