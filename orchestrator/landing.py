@@ -228,3 +228,41 @@ def cable_fields(scenario: Scenario, table: Mapping[str, np.ndarray]) -> dict[st
         "position": position,
         "tension": tension,
     }
+
+
+def interface_balance(
+    table: Mapping[str, np.ndarray], booked: Mapping[str, np.ndarray]
+) -> dict[str, dict[str, float]]:
+    """Return for every contact how well the energies on both sides of its two interfaces agree.
+
+    Parameters
+    ----------
+    table : signals over time
+    booked : load (``robot.wheel[1].force``) → work done through it over time, J; serves where an FMU books none itself
+
+    Returns
+    -------
+    contact → `exchanged_J`, the energy that went to and fro on cable and wheel; `cable_residual_J`,
+    `wheel_residual_J`, the largest difference between the work that component and contact have booked;
+    `law_residual_J`, the largest difference between the contact's work and what it stores and dissipates;
+    `relative`, the largest of the three by the energy exchanged
+    """
+    contacts = sorted(name.removesuffix(".work_cable") for name in table if name.endswith(".work_cable"))
+    return {contact: _balance(table, booked, contact) for contact in contacts}
+
+
+def _balance(table: Mapping[str, np.ndarray], booked: Mapping[str, np.ndarray], contact: str) -> dict[str, float]:
+    k = contact.removeprefix("contact")
+    work = {side: table[f"{contact}.work_{side}"] for side in ("cable", "wheel")}
+    residuals = {}
+    for side, port in (("cable", f"cable.port[{k}]"), ("wheel", f"robot.wheel[{k}]")):
+        theirs = table.get(f"{port}.work")
+        if theirs is None:
+            theirs = sum((values for name, values in booked.items() if name.startswith(f"{port}.")), np.zeros(1))
+        residuals[f"{side}_residual_J"] = float(np.max(np.abs(theirs - work[side])))
+    kept = table[f"{contact}.strain_energy"] + table[f"{contact}.dissipated_energy"]
+    law = work["cable"] + work["wheel"] + kept
+    residuals["law_residual_J"] = float(np.max(np.abs(law - law[0])))
+    exchanged = float(sum(np.sum(np.abs(np.diff(values))) for values in work.values()))
+    largest = max(residuals.values())
+    return {"exchanged_J": exchanged, **residuals, "relative": largest / exchanged if exchanged else largest}
