@@ -3,7 +3,7 @@
 from __future__ import annotations
 
 import numpy as np
-from scipy.optimize import brentq
+from scipy.optimize import root_scalar
 
 from fmus.cable import dynamics
 from fmus.cable.assembly import Model, interpolate
@@ -184,7 +184,7 @@ class Cable:
         parabola = chord * (1.0 + 4.0 * (self["sag"] / chord) ** 2) + self["sag"] * 0.01
         longest = min(parabola, chord + 2.1 * self["sag"])
         try:
-            return float(brentq(excess, 0.99 * chord, longest, xtol=1e-12 * chord))
+            return float(root_scalar(excess, bracket=(0.99 * chord, longest), xtol=1e-12 * chord).root)
         except ValueError:
             raise ModuleError(
                 f"cable: sag: {self['sag']:g} m cannot be reached; check it against span, axial_stiffness and linear_density"
