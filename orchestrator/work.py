@@ -39,10 +39,10 @@ class _Interface:
         self.motion.get()
         u, slopes = graph.acted, graph.r if self.own else graph.acted
         x1, x0 = self.motion.values, self.before
-        total = float(u[self.loads] @ (x1 - x0))
+        total = u.take(self.loads).dot(x1 - x0)
         if self.mean is not None and self.rates.size:
             self.mean.get()
-            total += float(slopes[self.rates] @ (H / 2 * (x0 + x1) - H * self.mean.values))
+            total += slopes.take(self.rates).dot(H / 2 * (x0 + x1) - H * self.mean.values)
         if self.relative:
             self.before = x1.copy()
         return total

@@ -181,9 +181,10 @@ class Cable:
             return 0.5 * self["level_difference"] - point[2] - self["sag"]
 
         chord = float(np.hypot(self["span"], self["level_difference"]))
-        longest = chord * (1.0 + 4.0 * (self["sag"] / chord) ** 2) + self["sag"] * 0.01
+        parabola = chord * (1.0 + 4.0 * (self["sag"] / chord) ** 2) + self["sag"] * 0.01
+        longest = min(parabola, chord + 2.1 * self["sag"])
         try:
-            return float(brentq(excess, 0.99 * chord, longest, xtol=1e-9 * chord))
+            return float(brentq(excess, 0.99 * chord, longest, xtol=1e-12 * chord))
         except ValueError:
             raise ModuleError(
                 f"cable: sag: {self['sag']:g} m cannot be reached; check it against span, axial_stiffness and linear_density"

@@ -130,10 +130,25 @@ def equilibrium(model: Model, span: float, level_difference: float, load: np.nda
             converged, q = _minimise(model._replace(ei=ei), q, external)
         if converged:
             return q
-    raise ModuleError(
-        "cable: no static equilibrium was found; "
-        "check unstretched_length, span and axial_stiffness, or take more elements"
-    )
+    raise ModuleError(f"cable: no static equilibrium was found; {_cure(model)}")
+
+
+def _cure(model: Model) -> str:
+    """Return what to do about a missing equilibrium.
+
+    In clamps, elements much longer than the bending layer √(EI/T) cannot follow it: a slack cable then buckles there, on paper
+    only, and the equilibrium in the vertical plane is not a minimum of the energy.
+    """
+    weight = model.density * model.gravity * model.s[-1]
+    if weight == 0.0:
+        return "a slack cable without gravity has none; shorten unstretched_length or set gravity"
+    layer, first = np.sqrt(model.ei / weight), model.s[1]
+    if np.linalg.matrix_rank(model.ends[0]) == 1 and first > layer:
+        return (
+            f"the cable bends in the clamps over about {layer:.2g} m, but the first element is {first:.2g} m long: "
+            "set grading, e.g. 30, or more n_elements"
+        )
+    return "check unstretched_length, span and axial_stiffness, or take more elements"
 
 
 def _bending_stiffnesses(model: Model, n: int) -> np.ndarray:

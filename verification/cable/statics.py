@@ -75,7 +75,7 @@ CASES = [
 
 
 def computed(case: Case, n_elements: int, grading: float) -> tuple[float, float, float]:
-    """Return sag (m) under the load or at midspan, force of the left support (N), slope angle (rad) at 1/4 or, pinned, 0."""
+    """Return sag (m) under the load or at midspan, force of the left support (N), slope (rad) there; in clamps, at 1/4."""
     settings, s = case.settings, _sag_at(case)
     model, q = loaded_equilibrium(
         settings,
