@@ -58,6 +58,7 @@ class Node:
     outputs : outputs that feed continuous connections; a slice of `Graph.y`
     discrete_inputs, discrete_outputs : the same for discrete connections; slices of `Graph.d`, `Graph.e`
     rates : inputs ``_rate`` of its loads that nothing feeds; a slice of `Graph.r`
+    acted : its slice of `Graph.acted`
     forward : (m,) int, where in `Graph.y` the inputs after the torn ones come from
     forward_values : (m,) view of `Graph.u`
     feedthrough : whether one of the outputs depends on one of the inputs without a step
@@ -70,6 +71,7 @@ class Node:
     discrete_inputs: Group
     discrete_outputs: Group
     rates: Group
+    acted: np.ndarray
     first: int
     torn: int
     forward: np.ndarray
@@ -111,9 +113,10 @@ class Graph:
     Attributes
     ----------
     u : (n_u,) continuous inputs of all components, in their units
+    acted : (n_u,) what acted in the last step: a master that interpolates takes `u` to the end of the step afterwards
     y : (n_y,) continuous outputs
-    r : (n_r,) rates of loads that no connection feeds, for the master to set; `rate_of` (n_r,) are the
-        loads' places in u
+    r : (n_r,) rates of loads that no connection feeds (`free_rates`), for the master to set; `rate_of` (n_r,) are
+        the loads' places in u
     source, gain, offset : (n_u,) u = gain * y[source] + offset; `gain` is None when all are 1 and 0
     torn : (n_t,) places in `u` that are fed by a component later in the order (or itself): the unknowns of
         implicit masters
@@ -173,6 +176,7 @@ class Graph:
         self._outputs = sorted(dict.fromkeys(k.source for k in continuous), key=lambda s: rank[s[0]])
         self._discrete_outputs = sorted(dict.fromkeys(k.source for k in discrete), key=lambda s: rank[s[0]])
         self.u, self.y = np.zeros(len(continuous)), np.zeros(len(self._outputs))
+        self.acted = self.u.copy()
         self.d, self.e = np.zeros(len(discrete)), np.zeros(len(self._discrete_outputs))
         self.source, self.gain, self.offset = _gather(continuous, self._outputs)
         self.discrete_source, self.discrete_gain, self.discrete_offset = _gather(
@@ -181,8 +185,8 @@ class Graph:
         torn = [i for i, k in enumerate(continuous) if rank[k.source[0]] >= rank[k.target[0]]]
         self.torn = np.array(torn, dtype=np.intp)
         self.input_names = [".".join(target) for target in self._inputs]
-        self._rates, self.rate_of = self._free_rates()
-        self.r = np.zeros(len(self._rates))
+        self.free_rates, self.rate_of = self._free_rates()
+        self.r = np.zeros(len(self.free_rates))
 
     def _free_rates(self) -> tuple[list[tuple[str, str]], np.ndarray]:
         """Return the inputs ``_rate`` of connected loads that nothing feeds, and the places of those loads
@@ -220,7 +224,8 @@ class Graph:
             group(self._outputs, self.y),
             group(self._discrete_inputs, self.d),
             group(self._discrete_outputs, self.e),
-            group(self._rates, self.r),
+            group(self.free_rates, self.r),
+            self.acted[first : first + len(inputs.names)],
             first,
             torn,
             self.source[forward],

@@ -166,7 +166,7 @@ def graph(scenario: Scenario, exchange: str) -> Graph:
             contact = Fmu(scenario.contact.fmu or library.contact_fmu(), f"contact{k}")
             components[f"contact{k}"] = contact
             contact.set_parameters(resolved.contact | {"initial.s": s, "exchange": exchange})
-        return Graph(components, _connections(components), order=tuple(components))
+        return Graph(components, _connections(components, exchange), order=tuple(components))
     except BaseException:
         for fmu in components.values():
             fmu.close()
@@ -178,8 +178,11 @@ def _gives_means(components: Mapping[str, Fmu]) -> bool:
     return "port[1].position_mean.x" in cable and "wheel[1].rotation_mean.x" in robot
 
 
-def _connections(components: Mapping[str, Fmu]) -> list[Connection]:
-    """Return all connections of the contract for which both sides have the variable."""
+def _connections(components: Mapping[str, Fmu], exchange: str) -> list[Connection]:
+    """Return all connections of the contract for which both sides have the variable.
+
+    `point` gives no slopes: left open, the masters set them by joining or extrapolating the forces of the ends.
+    """
     found: list[Connection] = []
     for name in components:
         if not name.startswith("contact"):
@@ -187,7 +190,7 @@ def _connections(components: Mapping[str, Fmu]) -> list[Connection]:
         k = name.removeprefix("contact")
         for side, partner in (("cable", f"cable.port[{k}]"), ("wheel", f"robot.wheel[{k}]")):
             found += _links(components, f"{name}.{side}", partner)
-    return found
+    return [c for c in found if exchange != "point" or "_rate." not in c.source]
 
 
 def _links(components: Mapping[str, Fmu], contact: str, partner: str) -> Iterator[Connection]:
@@ -230,9 +233,7 @@ def cable_fields(scenario: Scenario, table: Mapping[str, np.ndarray]) -> dict[st
     }
 
 
-def interface_balance(
-    table: Mapping[str, np.ndarray], booked: Mapping[str, np.ndarray]
-) -> dict[str, dict[str, float]]:
+def interface_balance(table: Mapping[str, np.ndarray], booked: Mapping[str, np.ndarray]) -> dict[str, dict[str, float]]:
     """Return for every contact how well the energies on both sides of its two interfaces agree.
 
     Parameters

@@ -30,14 +30,14 @@ def system(masses: dict[str, dict], law: dict, *, rates: bool = True) -> Graph:
     """
     parts = {name: fmu("link", name, **settings) for name, settings in masses.items()}
     parts["law"] = fmu("law", "law", **law)
-    pairs = []
+    pairs: list[tuple[str, str]] = []
     for side in masses:
         pairs += [(f"{side}.{name}", f"law.{side}.{name}") for name in ("position", "velocity", "position_mean")]
         pairs += [(f"law.{side}.{name}", f"{side}.{name}") for name in ("force", "force_rate")[: 1 + rates]]
     return Graph(parts, [Connection(*pair) for pair in pairs])
 
 
-def run(graph: Graph, stop: float, step: float = H, record: list[str] | None = None, master="iqn_ils", **options) -> Log:
+def run(graph: Graph, stop: float, step: float = H, record=None, master="iqn_ils", **options) -> Log:
     try:
         log = simulate(graph, MASTERS[master](graph, **options), 0.0, stop, step, record)
     finally:
@@ -287,7 +287,7 @@ def stick_slip(time: float) -> np.ndarray:
 
 
 def test_order_across_stick_and_slip():
-    """Every half swing sticks, slips and sticks again inside macro steps; the force has a kink there, as at exponent 1."""
+    """Every half swing sticks, slips and sticks again inside macro steps; a kink in the force as at exponent 1."""
     exact = stick_slip(0.16)
     steps, errors = 0.16 / np.array([20, 28, 40, 56, 80, 113, 160, 226]), []
     for step in steps:
@@ -295,3 +295,14 @@ def test_order_across_stick_and_slip():
         graph = system({"a": mass}, {"stiffness": 0.0, "tangential": BRISTLE, "limit": LIMIT})
         errors.append(abs(run(graph, 0.16, step, ["a.position"], tolerance=1e-12).values[-1, 0] - exact[0]))
     assert np.polyfit(np.log(steps), np.log(errors), 1)[0] > 1.8
+
+
+@pytest.mark.parametrize(
+    ("master", "extrapolation"), [("iqn_ils", None), ("jacobi", 1), ("gauss_seidel", 1), ("jacobi", 0)]
+)
+def test_work_of_a_force_that_the_master_joins_or_extrapolates(master, extrapolation):
+    """What the mass gains is the work booked, slope set by the master included: the mass is exact."""
+    options = {} if extrapolation is None else {"extrapolation": extrapolation}
+    graph = system({"a": {"initial_position": 0.1}}, {"stiffness": 100.0, "exchange": POINT}, rates=False)
+    log = run(graph, 1.0, record=["a.velocity"], master=master, **options)
+    assert log.energy["a.force"] == pytest.approx(0.5 * log.values[:, 0] ** 2, abs=1e-12)

@@ -192,6 +192,7 @@ def step_node(between: Between | None, node: Node, t: float, H: float) -> None:
     if node.rates.names:
         node.rates.set()
     node.fmu.step(t, H)
+    node.acted[:] = node.inputs.values
     if ends is not None:
         node.inputs.values[:] = ends
         if node.feedthrough:

@@ -16,7 +16,8 @@ PARAMETERS |= {"tangential": 0.0, "limit": 0.0, "exchange": 0.0}
 INPUTS = [f"{side}.{name}" for side in "ab" for name in ("position", "velocity", "position_mean")]
 OUTPUTS = ["a.force", "a.force_rate", "b.force", "b.force_rate", "law_work", "stored"]
 NAMES = [*PARAMETERS, *INPUTS, *OUTPUTS]
-K, N, C, D, GAP, TWO_SIDED, TANGENTIAL, LIMIT, EXCHANGE, XA, VA, MA, XB, VB, MB, FA, RA, FB, RB, WORK, STORED = range(21)
+K, N, C, D, GAP, TWO_SIDED, TANGENTIAL, LIMIT, EXCHANGE = range(9)
+XA, VA, MA, XB, VB, MB, FA, RA, FB, RB, WORK, STORED = range(9, 21)
 NODES, WEIGHTS = np.polynomial.legendre.leggauss(12)
 SIGMA, WEIGHTS = (NODES + 1) / 2, WEIGHTS / 2
 
