@@ -606,10 +606,9 @@ def settle(system, state, move, space, work):
     if _walls(system, state.robot, space.cable_point, space.out[0], space) != OK:
         return CONTACT_FAILED
     _loads(system, state.robot, space.cable_point, space.trial, state.contacts, space.out[0], space.generalized, space)
-    for k in range(arcs.size):
-        state.contacts[k, STATUS] = _regime(system.contacts[k], space.out[0, k])
     if move:
         for k in range(arcs.size):
+            state.contacts[k, STATUS] = _regime(system.contacts[k], space.out[0, k])
             _remember(state.contacts[k], space.out[0, k], arcs[k])
     return status
 
