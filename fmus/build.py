@@ -176,19 +176,13 @@ def rename_imports(source: str, new_names: Mapping[str, str], path: Path) -> str
     renamed = re.sub(pattern, lambda match: match[1] + new_names[match[2]], source, flags=re.MULTILINE)
     for node in ast.walk(ast.parse(renamed)):
         if isinstance(node, ast.Import):
-            left = [
-                a.name
-                for a in node.names
-                if _is_in(a.name, new_names) or (not a.asname and "fmus_" in a.name)
-            ]
+            left = [a.name for a in node.names if _is_in(a.name, new_names) or (not a.asname and "fmus_" in a.name)]
         elif isinstance(node, ast.ImportFrom) and not node.level:
             left = [node.module] if _is_in(node.module or "", new_names) else []
         else:
             continue
         if left:
-            raise ModuleError(
-                f"{path}, line {node.lineno}: import {left[0]}: write `from … import …`, one a line"
-            )
+            raise ModuleError(f"{path}, line {node.lineno}: import {left[0]}: write `from … import …`, one a line")
     return renamed
 
 

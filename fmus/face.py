@@ -181,9 +181,7 @@ class ModuleSlave(Fmi2Slave):
             return False
         except Exception as error:
             self._restore(before)
-            self._report(
-                f"step from t = {current_time:.9g} s by {step_size:.3g} s", error, Fmi2Status.discard
-            )
+            self._report(f"step from t = {current_time:.9g} s by {step_size:.3g} s", error, Fmi2Status.discard)
             return False
         self._dirty = False
         return True
@@ -202,9 +200,7 @@ class ModuleSlave(Fmi2Slave):
 
     def _initialize(self) -> None:
         self._initialized_with = b""
-        self._require_finite(
-            "set a finite value", self._table.names("parameter") + self._table.names("input")
-        )
+        self._require_finite("set a finite value", self._table.names("parameter") + self._table.names("input"))
         self._module.initialize(self._start_time)
         self._view = memoryview(self._module.values)  # type: ignore[arg-type]
         self._require_finite("check the parameters", self._table.names("output"))
@@ -269,9 +265,7 @@ class ModuleSlave(Fmi2Slave):
         if self._dirty and not self._output_set.isdisjoint(vrs):
             self._refresh()
         if not self._readable[kind].issuperset(vrs):
-            raise self._fatal(
-                f"get {kind}", ModuleError(f"value references {vrs}: not all of them are {kind}")
-            )
+            raise self._fatal(f"get {kind}", ModuleError(f"value references {vrs}: not all of them are {kind}"))
         view = self._view
         return [view[i] for i in vrs]
 

@@ -59,9 +59,7 @@ def keep_copy(bundle: Path, expected: str) -> Path:
             return folder
         except OSError:
             continue
-    raise ImportError(
-        "the FMU's sources can be copied nowhere; make ~/.cache or the temporary folder writable"
-    )
+    raise ImportError("the FMU's sources can be copied nowhere; make ~/.cache or the temporary folder writable")
 
 
 def place_copy(bundle: Path, folder: Path) -> None:

@@ -11,6 +11,7 @@ from __future__ import annotations
 import hashlib
 import os
 import tempfile
+from collections.abc import Callable
 from pathlib import Path
 
 import numba
@@ -43,5 +44,13 @@ def _cache_folder() -> Path:
 
 numba.config.CACHE_DIR = str(_cache_folder())  # type: ignore[attr-defined]
 
-kernel = numba.njit(cache=True, error_model="numpy")
-"""Decorator of every kernel."""
+
+def kernel(function: Callable) -> Callable:
+    """Compile a kernel; decorator.
+
+    Without Numba's run time (reference counts) nothing can be allocated: such code does not compile. A kernel whose name
+    begins with an underscore is called by kernels only, and gets no wrapper for Python. Both shorten compilation by
+    a fifth each.
+    """
+    options = {"cache": True, "error_model": "numpy", "_nrt": False, "no_cfunc_wrapper": True}
+    return numba.njit(**options, no_cpython_wrapper=function.__name__.startswith("_"))(function)

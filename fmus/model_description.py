@@ -69,9 +69,7 @@ def variability(variable: Variable) -> str:
     return "discrete" if variable.discrete or variable.kind != "real" else "continuous"
 
 
-def model_description(
-    recipe: FmuRecipe, table: VariableTable, values: np.ndarray, guid: str, date: str
-) -> bytes:
+def model_description(recipe: FmuRecipe, table: VariableTable, values: np.ndarray, guid: str, date: str) -> bytes:
     """Return modelDescription.xml.
 
     Parameters
@@ -148,9 +146,7 @@ def _add_structure(root: Element, table: VariableTable) -> None:
 
 
 def _add_unknown(parent: Element, place: int, dependencies: list[int]) -> None:
-    SubElement(
-        parent, "Unknown", index=str(place + 1), dependencies=" ".join(str(i + 1) for i in dependencies)
-    )
+    SubElement(parent, "Unknown", index=str(place + 1), dependencies=" ".join(str(i + 1) for i in dependencies))
 
 
 def documentation(recipe: FmuRecipe, table: VariableTable, values: np.ndarray, readme: str) -> str:

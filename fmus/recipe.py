@@ -53,9 +53,7 @@ class FmuRecipe:
         if not re.fullmatch(r"[A-Za-z][A-Za-z0-9_]*", self.name):
             raise ModuleError(f"FMU name {self.name!r}: use letters, digits and underscores, a letter first")
         if not re.fullmatch(r"\w+(\.\w+)+:\w+", self.factory):
-            raise ModuleError(
-                f"{self.name}: factory {self.factory!r} is not of the form package.module:Class"
-            )
+            raise ModuleError(f"{self.name}: factory {self.factory!r} is not of the form package.module:Class")
 
     @property
     def packages(self) -> tuple[str, ...]:

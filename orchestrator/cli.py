@@ -6,6 +6,7 @@ Exit status: 0 done and within tolerance; 1 done, but a tolerance or a safety li
 
 from __future__ import annotations
 
+import os
 import sys
 from collections.abc import Callable, Iterator
 from contextlib import contextmanager
@@ -183,6 +184,32 @@ def compare(
 
 
 @app.command()
+def modes(
+    scenario: ScenarioFile,
+    count: Annotated[int, typer.Option(help="Number of modes out of the vertical plane, and in it.")] = 6,
+    out: Annotated[Path | None, typer.Option(help="Directory for table and picture; it must not exist.")] = None,
+    set_: Set = None,
+) -> None:
+    """Natural frequencies, damping ratios and shapes of the scenario's cable about its static equilibrium."""
+    from rich.table import Table
+
+    from orchestrator import modes as vibration
+
+    loaded = _load(scenario, None, set_)
+    path = None if out is None else _free(out, loaded.name)
+    found = vibration.of_scenario(loaded, count)
+    table = Table("mode", "out of plane \\[Hz]", "damping", "in plane \\[Hz]", "damping", box=None, pad_edge=False)
+    groups = (found.out_of_plane, found.in_plane)
+    for k in range(max(group.frequency.size for group in groups)):
+        cells = [(f"{g.frequency[k]:.6g}", f"{g.damping_ratio[k]:.3g}") if k < g.frequency.size else ("", "") for g in groups]
+        table.add_row(str(k + 1), *cells[0], *cells[1])
+    _print(table)
+    if path is not None:
+        vibration.write(found, path)
+        print(f"table and picture in {path}")
+
+
+@app.command()
 def report(
     directory: Annotated[Path, typer.Argument(metavar="DIR", help="Directory of a finished run.")],
 ) -> None:
@@ -228,12 +255,15 @@ def _items(text: str | None) -> list[str]:
 
 
 def _free(out: Path | None, name: str) -> Path:
-    """Return the directory to be made; `InputError`, before anything is run, if it exists."""
+    """Return the directory to be made; `InputError`, before anything is run, if it exists or cannot be made."""
     from orchestrator.results import default_directory
 
     path = out or default_directory(name)
     if path.exists():
         raise InputError(f"{path}: exists already; remove it or choose another with --out")
+    parent = next(p for p in path.absolute().parents if p.exists())
+    if not (parent.is_dir() and os.access(parent, os.W_OK)):
+        raise InputError(f"{path}: cannot be made, {parent} is no folder to write to; choose another with --out")
     return path
 
 

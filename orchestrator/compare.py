@@ -13,6 +13,9 @@ from orchestrator.results import Table
 
 REFERENCE_MARGIN = 0.1
 """The reference's own error may be this part of a tolerance, or the verdict means nothing."""
+CONSTANT = 1e-6
+"""A signal whose reference moves by less than this (m, rad …) counts as constant: the verdict then takes this as its scale, as
+for the roll of a landing at midspan, which is zero by symmetry."""
 
 
 @dataclass(frozen=True)
@@ -194,11 +197,12 @@ def _check(run: Run, signal: str, tolerance: float, estimate: float | None) -> C
     if error is None:
         note = "not among the signals of run and reference"
         return Check(run.master, run.macro_step, signal, float("nan"), tolerance, False, note)
-    value, note = error.relative_max_error, ""
+    scale = max(error.scale, CONSTANT)
+    value, note = error.max_error / scale, ""
     if estimate is None:
         note = "the reference does not say how accurate it is"
-    elif not estimate <= REFERENCE_MARGIN * tolerance * error.scale:
-        note = f"reference not accurate enough: its own error is {estimate / max(error.scale, 1e-300):.1e}"
+    elif not estimate <= REFERENCE_MARGIN * tolerance * scale:
+        note = f"reference not accurate enough: its own error is {estimate / scale:.1e}"
     return Check(run.master, run.macro_step, signal, value, tolerance, value <= tolerance and not note, note)
 
 

@@ -8,7 +8,7 @@ from __future__ import annotations
 from dataclasses import dataclass
 
 import numpy as np
-from scipy.optimize import brentq, least_squares
+from scipy.optimize import least_squares, root_scalar
 
 from fmus.cable.assembly import interpolate
 from fmus.cable.module import Cable
@@ -27,7 +27,7 @@ class Placement:
 
 
 def touching_distance(contact: Contact) -> float:
-    """Return the distance (m) of wheel centre and centreline at which both walls just touch: R_b + d_c / (2 sin(θ/2))."""
+    """Return the distance (m) of wheel centre and centreline at which both walls touch: R_b + d_c / (2 sin(θ/2))."""
     prm = dict(zip(contact.table.names("parameter"), contact.values, strict=False))
     half = 0.5 * prm["groove_angle"]
     apex = prm["wheel_radius"] - 0.5 * prm["groove_width"] / np.tan(half)
@@ -45,8 +45,8 @@ def place(
     height : lift above touching, m
     velocity : sinking speed at the start, m/s
 
-    Roll is turned so that all wheels touch where there are several; other angles, and the roll of a robot with one wheel, are
-    its parameters ``initial.*``.
+    Roll is turned so that all wheels touch where there are several; other angles, and the roll of a robot with one
+    wheel, are its parameters ``initial.*``.
 
     Raises
     ------
@@ -54,9 +54,7 @@ def place(
     """
     span = cable["span"]
     if not 0.0 < position < span:
-        raise ModuleError(
-            f"landing.position = {position:g} m is off the span; choose one between 0 and {span:g} m"
-        )
+        raise ModuleError(f"landing.position = {position:g} m is off the span; choose one between 0 and {span:g} m")
     names = [f"initial.{a}" for a in ("roll", "pitch", "yaw")]
     angles = np.array([robot.values[robot.table.index[n]] for n in names])
     mounts = np.array([_mount(robot, k) for k in range(robot.n_wheels)])
@@ -111,11 +109,15 @@ def _height(cable: Cable, y: float) -> float:
 def arc_length_at(cable: Cable, y: float) -> float:
     """Return the unstretched arc length at the horizontal position `y` of the cable at rest."""
     length = float(cable.model.s[-1])
-    return float(brentq(lambda s: _point(cable, s)[1] - y, 0.0, length, xtol=1e-12 * length))
+    found = root_scalar(lambda s: _point(cable, s)[1] - y, bracket=(0.0, length), xtol=1e-12 * length)
+    return float(found.root)
 
 
 def _foot(cable: Cable, centre: np.ndarray) -> tuple[float, float, float]:
-    """Return arc length, distance (negative under the cable) and y of the cable's point nearest to `centre`, in the y-z plane."""
+    """Return arc length, distance (negative under the cable) and y of the cable's point nearest to `centre` (3,).
+
+    All in the plane of the cable, y and z.
+    """
     s = arc_length_at(cable, float(np.clip(centre[1], 1e-6, cable["span"] - 1e-6)))
     length = float(cable.model.s[-1])
     for _ in range(20):

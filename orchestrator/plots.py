@@ -108,7 +108,7 @@ def overview(path: Path, run: Table, reference: Table | None, panels: Sequence[P
 
 def _signal_panel(axis: Axes, panel: Panel, run: Table, reference: Table | None) -> None:
     if reference is not None:
-        axis.plot(reference["time"], _shown(panel, reference), color="0.6", linewidth=2.6, label="Monolithic")
+        axis.plot(reference["time"], _shown(panel, reference), color="0.6", linewidth=2.6, label="Reference")
     line = (0, (4, 2)) if reference is not None else "-"
     axis.plot(run["time"], _shown(panel, run), color=VERMILION, linewidth=1.1, label="Coupled", linestyle=line)
     axis.set_ylabel(f"{panel.label} [{panel.unit}]")
@@ -118,9 +118,9 @@ def _signal_panel(axis: Axes, panel: Panel, run: Table, reference: Table | None)
 
 def _difference_panel(axis: Axes, panel: Panel, run: Table, reference: Table) -> None:
     difference = _difference(panel.signal, run, reference) * panel.factor
-    axis.semilogy(run["time"], _above_zero(difference), color=BLUE, linewidth=0.9)
+    _logarithmic(axis, run["time"], difference, BLUE)
+    _decades(axis)
     axis.set_ylabel(f"|Difference| [{panel.unit}]")
-    _decades(axis, [difference])
 
 
 def _shown(panel: Panel, table: Table) -> np.ndarray:
@@ -133,11 +133,25 @@ def _difference(signal: str, run: Table, reference: Table) -> np.ndarray:
     return np.abs(run[signal] - reference[signal][matching_rows(reference["time"], run["time"])])
 
 
-def _decades(axis: Axes, curves: Sequence[np.ndarray]) -> None:
-    """Let a logarithmic axis end three decades below the smallest peak, not in zero crossings."""
-    peaks = [peak for curve in curves if (peak := np.max(curve, initial=0.0)) > 0.0 and np.isfinite(peak)]
-    if peaks:
-        axis.set_ylim(1e-3 * min(peaks), 3.0 * max(peaks))
+def _envelope(time: np.ndarray, values: np.ndarray, bins: int = 300) -> tuple[np.ndarray, np.ndarray]:
+    """Return times and the largest value in each of `bins` short spans: a difference without its zero crossings."""
+    groups = np.array_split(np.arange(len(time)), min(bins, len(time)))
+    return np.array([time[g].mean() for g in groups]), np.array([values[g].max() for g in groups])
+
+
+def _logarithmic(axis: Axes, time: np.ndarray, values: np.ndarray, colour: str, label: str | None = None) -> None:
+    """Draw the envelope of a difference on a logarithmic axis."""
+    t, largest = _envelope(time, values)
+    axis.semilogy(t, _above_zero(largest), color=colour, linewidth=0.9, label=label)
+
+
+def _decades(axis: Axes) -> None:
+    """Let a logarithmic axis show two decades at least, and cut off the steep start."""
+    curves = [np.asarray(line.get_ydata(), float) for line in axis.lines]
+    curves = [curve[np.isfinite(curve)] for curve in curves if np.any(np.isfinite(curve))]
+    if curves:
+        top = 2.0 * max(curve.max() for curve in curves)
+        axis.set_ylim(min(0.01 * top, *(0.5 * np.percentile(curve, 3) for curve in curves)), top)
     axis.yaxis.set_major_locator(LogLocator(numticks=6))
     axis.minorticks_off()
 
@@ -157,10 +171,10 @@ def errors(path: Path, runs: Mapping[str, Table], reference: Table, panels: Sequ
     with _figure(path, (6.4, 1.7 * len(panels) + 0.6)) as figure:
         axes = figure.subplots(len(panels), 1, sharex=True, squeeze=False)[:, 0]
         for axis, panel in zip(axes, panels, strict=True):
-            curves = [_difference(panel.signal, run, reference) * panel.factor for run in runs.values()]
-            for (label, run), curve, colour in zip(runs.items(), curves, _cycle(COLOURS), strict=False):
-                axis.semilogy(run["time"], _above_zero(curve), color=colour, linewidth=0.9, label=label)
-            _decades(axis, curves)
+            for (label, run), colour in zip(runs.items(), _cycle(COLOURS), strict=False):
+                difference = _difference(panel.signal, run, reference) * panel.factor
+                _logarithmic(axis, run["time"], difference, colour, label)
+            _decades(axis)
             axis.set_ylabel(f"|Δ {panel.label}|\n[{panel.unit}]")
             axis.set_xlim(reference["time"][0], reference["time"][-1])
         axes[-1].set_xlabel("Time [s]")
@@ -285,13 +299,14 @@ def energy(path: Path, audit: Audit) -> None:
 
 
 def _telling_instants(run: Table, time: np.ndarray) -> list[int]:
-    """Return rows of `time`: the start, two on the way to the lowest point, that, the rebound, the end."""
-    z = run["robot.body.position.z"]
-    lowest = int(np.argmin(z))
-    rebound = lowest + int(np.argmax(z[lowest:]))
-    fall = run["time"][lowest] - time[0]
-    wanted = [time[0], time[0] + fall / 3, time[0] + 2 * fall / 3, *run["time"][[lowest, rebound, -1]]]
-    return sorted({int(np.argmin(np.abs(time - t))) for t in wanted})
+    """Return rows of `time`: the start, two on the way down, the first low point, the rebound, the end."""
+    t, z = run["time"], run["robot.body.position.z"]
+    deep = z[:-1] <= 0.5 * (np.min(z) + np.max(z))
+    rising = np.append(np.diff(z) > 0.0, True)
+    low = int(np.argmax(np.append(deep, True) & rising))
+    rebound = low + int(np.argmin(np.append(rising[low:-1], False)))
+    down = np.linspace(t[0], t[low], 4)
+    return sorted({int(np.argmin(np.abs(time - at))) for at in (*down, t[rebound], t[-1])})
 
 
 @contextmanager

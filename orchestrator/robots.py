@@ -232,11 +232,7 @@ def _assumptions(place: str, part: Any) -> list[tuple[str, str]]:
         return [found for k, item in enumerate(part, 1) for found in _assumptions(f"{place}[{k}]", item)]
     if isinstance(part, BaseModel):
         names = type(part).model_fields
-        return [
-            found
-            for name in names
-            for found in _assumptions(f"{place}.{name}".lstrip("."), getattr(part, name))
-        ]
+        return [found for name in names for found in _assumptions(f"{place}.{name}".lstrip("."), getattr(part, name))]
     return []
 
 
@@ -274,9 +270,7 @@ def _parse(path: Path) -> RobotSpec:
 
 def _word(path: Path, error: Any) -> str:
     """Return one line: file, key, cause and cure."""
-    key = "".join(f"[{part + 1}]" if isinstance(part, int) else f".{part}" for part in error["loc"]).lstrip(
-        "."
-    )
+    key = "".join(f"[{part + 1}]" if isinstance(part, int) else f".{part}" for part in error["loc"]).lstrip(".")
     match error["type"]:
         case "extra_forbidden":
             parent, last = error["loc"][:-1], str(error["loc"][-1])

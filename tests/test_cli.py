@@ -94,9 +94,16 @@ def test_an_existing_output_directory_is_not_touched(command: str, tmp_path: Pat
     assert done.returncode == 2 and "exists already" in done.stderr and list(tmp_path.iterdir()) == []
 
 
+def test_an_output_directory_that_cannot_be_made_is_found_before_the_run(tmp_path: Path):
+    (tmp_path / "file").write_text("")
+    done = orchestrate("run", OSCILLATOR, "--out", tmp_path / "file" / "out")
+    assert done.returncode == 2 and "cannot be made" in done.stderr
+
+
 def test_a_run_leaves_its_files(oscillator_run):
     done, out = oscillator_run
     assert done.returncode == 0 and f"results in {out}" in done.stdout
+    assert orchestrate("report", out).returncode == 0 and (out / "report.html").is_file()
     files = ("results.csv", "iterations.csv", "summary.json", "plots/overview.png", "plots/iterations.png")
     assert all((out / name).is_file() for name in files)
     content = manifest(out)

@@ -129,10 +129,9 @@ def iteration_matrix(model, q, v, cm, cv, cq, band, matrix, work):
                 matrix[i, j] = cv * work.C[i, j] + cq * work.K[i, j]
                 if i % 3 == j % 3:
                     matrix[i, j] += cm * work.m[i // 3, j // 3]
-        if e == 0:
-            _constrain_element(matrix, 0, model.ends[0], matrix[6, 6], matrix[12])
-        if e == n_elements - 1:
-            _constrain_element(matrix, 6, model.ends[1], matrix[0, 0], matrix[12])
+        for side in range(2):
+            if e == side * (n_elements - 1):
+                _constrain_element(matrix, 6 * side, model.ends[side], matrix[6 - 6 * side, 6 - 6 * side], matrix[12])
         for i in range(12):
             for j in range(12):
                 band[6 * e + i, HALF_BANDWIDTH + j - i] += matrix[i, j]

@@ -1,6 +1,6 @@
 """One macro step of the cable: inner steps of an implicit method, Newton with a factorisation that is used again.
 
-The state is flat: q (n), v (n), two rows of accelerations (2 n) and a few sums (`N_SUMS`); see `split`. The iteration
+The state is flat: q (n), v (n), two rows of accelerations (2 n) and a few sums (`N_SUMS`). The iteration
 matrix is made at the start of a macro step and whenever Newton's method slows down. It is kept beside the state
 with what it was made from: a macro step repeated from the same start, as an implicit master does, finds it ready,
 and as it is a function of that start alone, the repetition is bit-identical.
@@ -16,6 +16,7 @@ from fmus import banded
 from fmus.cable.assembly import (
     HALF_BANDWIDTH,
     ElementWork,
+    Model,
     add_inertia,
     add_load,
     constrain_vector,
@@ -59,6 +60,7 @@ class Work(NamedTuple):
     mode: np.ndarray
     real_band: np.ndarray
     real_matrix: np.ndarray
+    mass_band: np.ndarray
     key: np.ndarray
     load: np.ndarray
     point: np.ndarray
@@ -70,7 +72,7 @@ class Work(NamedTuple):
 
 
 def make_work(n: int, state_size: int) -> Work:
-    """Return new workspace for n coordinates."""
+    """Return new workspace for n coordinates; generalized-alpha wants `factorise_mass` too."""
     width = 2 * HALF_BANDWIDTH + 1
     return Work(
         element=element_work(),
@@ -87,6 +89,7 @@ def make_work(n: int, state_size: int) -> Work:
         mode=np.zeros(n, dtype=np.complex128),
         real_band=np.zeros((n, width)),
         real_matrix=np.zeros((13, 12)),
+        mass_band=np.zeros((n, width)),
         key=np.full(2 * n + 1, np.nan),
         load=np.zeros((2, 3)),
         point=np.zeros((2, 6)),
@@ -96,6 +99,12 @@ def make_work(n: int, state_size: int) -> Work:
         power=np.zeros(2),
         means=np.zeros((N_PORTS, 6)),
     )
+
+
+def factorise_mass(model: Model, q: np.ndarray, work: Work) -> None:
+    """Put the factors of the mass matrix into the workspace."""
+    iteration_matrix(model, q, np.zeros_like(q), 1.0, 0.0, 0.0, work.mass_band, work.real_matrix, work.element)
+    banded.factorise(work.mass_band)
 
 
 def state_size(n: int) -> int:
@@ -270,6 +279,7 @@ def generalized_alpha_step(model, method, state, h, offset, ports, tolerance, fr
 
     Chung & Hulbert 1993, eqs. (5)–(9), with all forces at the generalised midpoint t + (1 - alpha_f) h: the load of a macro
     step is then never taken from its neighbour. The first row of accelerations is a, the second its value at the midpoint.
+    `start_alpha` and `end_alpha` enclose the inner steps of a macro step.
     """
     n = model.weight.size
     q0, v0, a, sums = state[:n], state[n : 2 * n], state[2 * n : 4 * n].reshape(2, n), state[4 * n :]
@@ -324,6 +334,34 @@ def generalized_alpha_step(model, method, state, h, offset, ports, tolerance, fr
 
 
 @kernel
+def start_alpha(model, state, ports, offset, work):
+    """Turn what `end_alpha` left in the first row of accelerations into those under the loads of this macro step.
+
+    Generalized-alpha carries a from step to step, a value at t + (alpha_m - alpha_f) h. Loads that jump between
+    macro steps would leave it behind, an error of first order; what is kept is therefore M a less the loads.
+    """
+    n = model.weight.size
+    _port_loads(model, state[:n], ports, offset, work)
+    for i in range(n):
+        work.increment[i] = state[2 * n + i] + work.external[i]
+    constrain_vector(model, work.increment)
+    banded.solve(work.mass_band, work.increment)
+    for i in range(n):
+        state[2 * n + i] = work.increment[i]
+
+
+@kernel
+def end_alpha(model, state, ports, offset, work):
+    """Turn the first row of accelerations into M a less the loads; `offset` (s, from the middle) is where a belongs."""
+    n = model.weight.size
+    work.increment[:] = 0.0
+    add_inertia(model, state[2 * n : 3 * n], work.increment, work.element)
+    _port_loads(model, state[:n], ports, offset, work)
+    for i in range(n):
+        state[2 * n + i] = work.increment[i] - work.external[i]
+
+
+@kernel
 def port_motion(model, state, s, shape, out):
     """Write position, tangent, velocity and tangent rate at arc length `s` to `out` (12,)."""
     n = model.weight.size
@@ -353,7 +391,11 @@ def macro_step(model, collocation, alpha, use_alpha, state, h, longest, ports, m
         for i in range(3):
             first[k, i] = work.start[k, i]
     inner = h / max(1.0, np.ceil(h / longest - 1e-9))
-    halvings, elapsed, fresh = 0, 0.0, True
+    lag = alpha.alpha_m - alpha.alpha_f
+    if use_alpha:
+        start_alpha(model, state, ports, lag * inner - 0.5 * h, work)
+    halvings, elapsed = 0, 0.0
+    fresh = elapsed < h  # true; a constant here would be compiled as a type of its own
     while elapsed < h * (1.0 - 1e-12):
         step = min(inner, h - elapsed)
         if h - elapsed - step < 1e-9 * h:
@@ -373,7 +415,7 @@ def macro_step(model, collocation, alpha, use_alpha, state, h, longest, ports, m
             if halvings > MAX_HALVINGS:
                 return NOT_CONVERGED
             inner *= 0.5
-            fresh = True
+            fresh = elapsed < h
             continue
         fresh = abs(step - inner) > 1e-9 * inner
         for i in range(state.size):
@@ -387,6 +429,8 @@ def macro_step(model, collocation, alpha, use_alpha, state, h, longest, ports, m
                 means[k, i] += mean * step / h
             for i in range(12):
                 work.start[k, i] = point[i]
+    if use_alpha:
+        end_alpha(model, state, ports, lag * sums[LAST_INNER] + 0.5 * h, work)
     for k in range(N_PORTS):
         for i in range(3):
             force, rate = ports[k, 1 + i], ports[k, 7 + i]
@@ -440,15 +484,19 @@ def diagnose(model, method, use_alpha, state, ports, out, rows, work):
     """
     n = model.weight.size
     q, v, force = state[:n], state[n : 2 * n], work.residual[0]
-    for i in range(n):
-        end = method.end[0] * state[2 * n + i] + method.end[1] * state[3 * n + i]
-        work.a[0, i] = state[2 * n + i] if use_alpha else end
     out[3] = kinetic_energy(model, v, work.element, force)
     out[4] = internal_force(model, q, v, force, work.axial, work.element)[0]
     out[5] = -dot(model.weight, q)
     out[6] = state[4 * n + DISSIPATED]
-    add_inertia(model, work.a[0], force, work.element)
-    _port_loads(model, q, ports, 0.5 * state[4 * n + LAST_MACRO], work)
+    work.external[:] = 0.0
+    if use_alpha:  # M a less the loads is kept, see `end_alpha`
+        for i in range(n):
+            force[i] += state[2 * n + i]
+    else:
+        for i in range(n):
+            work.a[0, i] = method.end[0] * state[2 * n + i] + method.end[1] * state[3 * n + i]
+        add_inertia(model, work.a[0], force, work.element)
+        _port_loads(model, q, ports, 0.5 * state[4 * n + LAST_MACRO], work)
     for k in range(3):
         out[7 + k] = force[k] - model.weight[k] - work.external[k]
         out[10 + k] = force[n - 6 + k] - model.weight[n - 6 + k] - work.external[n - 6 + k]

@@ -148,6 +148,7 @@ class Cable:
         self._alpha = generalized_alpha(self["spectral_radius"])
         self._use_alpha = self["integrator"] == 1.0
         self._work = dynamics.make_work(n, self.state.size)
+        dynamics.factorise_mass(self.model, q, self._work)
         self.show()
         self._shown_ports[:, 12:18] = self._shown_ports[:, :6]
         self._shown_ports[:, 18] = 0.0

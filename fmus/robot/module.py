@@ -35,9 +35,7 @@ def _body_parameters(n_wheels: int) -> list[Variable]:
         ("initial.yaw", "rad", 0.0, "initial angle about z"),
     ]
     return [
-        Variable(
-            "n_wheels", "parameter", "1", n_wheels, "number of wheels; fixed by the model", kind="integer"
-        ),
+        Variable("n_wheels", "parameter", "1", n_wheels, "number of wheels; fixed by the model", kind="integer"),
         *(Variable(name, "parameter", unit, start, text) for name, unit, start, text in real),
         *vector("center_of_mass", "parameter", "m", "centre of mass from b, in B", (0.0, 0.0, -0.1)),
         *vector("initial.position", "parameter", "m", "initial position of b"),
@@ -50,9 +48,7 @@ def _wheel_parameters(wheel: str) -> list[Variable]:
     return [
         *vector(f"{wheel}.mount", "parameter", "m", "wheel centre from b, in B", (0.0, 0.0, 0.2152)),
         *vector(f"{wheel}.axle_direction", "parameter", "1", "axle in B, of any length", (1.0, 0.0, 0.0)),
-        Variable(
-            f"{wheel}.braked", "parameter", "1", True, "fixed to the body, not free to spin", kind="boolean"
-        ),
+        Variable(f"{wheel}.braked", "parameter", "1", True, "fixed to the body, not free to spin", kind="boolean"),
         Variable(f"{wheel}.inertia", "parameter", "kg.m2", 5e-3, "spin inertia about the axle; used if free"),
     ]
 
@@ -61,13 +57,9 @@ def _wheel_inputs(wheel: str) -> list[Variable]:
     return [
         *vector(f"{wheel}.force", "input", "N", "contact force on the wheel, mean over the macro step"),
         *vector(f"{wheel}.moment", "input", "N.m", "contact moment about the wheel centre, mean"),
-        Variable(
-            f"{wheel}.drive_torque", "input", "N.m", 0.0, "torque of the body on the wheel, about the axle"
-        ),
+        Variable(f"{wheel}.drive_torque", "input", "N.m", 0.0, "torque of the body on the wheel, about the axle"),
         *vector(f"{wheel}.force_rate", "input", "N/s", "slope of the contact force within the macro step"),
-        *vector(
-            f"{wheel}.moment_rate", "input", "N.m/s", "slope of the contact moment within the macro step"
-        ),
+        *vector(f"{wheel}.moment_rate", "input", "N.m/s", "slope of the contact moment within the macro step"),
     ]
 
 
@@ -76,16 +68,10 @@ def _wheel_outputs(wheel: str) -> list[Variable]:
         *vector(f"{wheel}.position", "output", "m", "wheel centre"),
         *vector(f"{wheel}.axle", "output", "1", "axle, unit vector"),
         *vector(f"{wheel}.velocity", "output", "m/s", "velocity of the wheel centre"),
-        *vector(
-            f"{wheel}.angular_velocity", "output", "rad/s", "angular velocity of the wheel, spin included"
-        ),
-        *vector(
-            f"{wheel}.position_mean", "output", "m", "time mean of the position over the last macro step"
-        ),
+        *vector(f"{wheel}.angular_velocity", "output", "rad/s", "angular velocity of the wheel, spin included"),
+        *vector(f"{wheel}.position_mean", "output", "m", "time mean of the position over the last macro step"),
         *vector(f"{wheel}.axle_mean", "output", "1", "time mean of the axle over the last macro step"),
-        *vector(
-            f"{wheel}.rotation", "output", "rad", "integral of the angular velocity over the last macro step"
-        ),
+        *vector(f"{wheel}.rotation", "output", "rad", "integral of the angular velocity over the last macro step"),
         *vector(f"{wheel}.rotation_mean", "output", "rad", "time mean of that running integral"),
         Variable(f"{wheel}.work", "output", "J", 0.0, "work done on the robot through this wheel"),
     ]
@@ -98,9 +84,7 @@ def _body_outputs() -> list[Variable]:
         Variable("roll", "output", "rad", 0.0, "angle about x, without jumps"),
         Variable("pitch", "output", "rad", 0.0, "angle about y, within a quarter turn"),
         Variable("yaw", "output", "rad", 0.0, "angle about z, without jumps"),
-        *vector(
-            "body.angular_velocity", "output", "rad/s", "angular velocity of the body, inertial components"
-        ),
+        *vector("body.angular_velocity", "output", "rad/s", "angular velocity of the body, inertial components"),
         Variable("kinetic_energy", "output", "J", 0.0, "kinetic energy, spinning wheels included"),
         Variable("gravitational_energy", "output", "J", 0.0, "m g Z of the centre of mass"),
         Variable("control_work", "output", "J", 0.0, "work done by thrust, control torque and drive torques"),
@@ -145,9 +129,7 @@ def _check_finite(values: np.ndarray, table: VariableTable) -> None:
 
 def inertia_tensor(values: np.ndarray, table: VariableTable) -> np.ndarray:
     """Return the inertia tensor about G in B (3, 3), kg m²; raise `ModuleError` if no body can have it."""
-    xx, yy, zz, xy, xz, yz = (
-        values[table.index[f"inertia.{c}"]] for c in ("xx", "yy", "zz", "xy", "xz", "yz")
-    )
+    xx, yy, zz, xy, xz, yz = (values[table.index[f"inertia.{c}"]] for c in ("xx", "yy", "zz", "xy", "xz", "yz"))
     tensor = np.array([[xx, xy, xz], [xy, yy, yz], [xz, yz, zz]])
     smallest, middle, largest = np.linalg.eigvalsh(tensor)
     if smallest <= 0.0:
@@ -187,9 +169,7 @@ def body_parameters(values: np.ndarray, table: VariableTable) -> np.ndarray:
     _check_finite(values, table)
     n_wheels = int(table["n_wheels"].start)
     if values[table.index["n_wheels"]] != n_wheels:
-        raise ModuleError(
-            f"n_wheels: this model has {n_wheels}; take a model of a robot with the wheels wanted"
-        )
+        raise ModuleError(f"n_wheels: this model has {n_wheels}; take a model of a robot with the wheels wanted")
     prm = np.zeros(rb.N_PARAMETERS)
     prm[rb.MASS] = _positive(values, table, "mass")
     prm[rb.GRAVITY] = values[table.index["gravity"]]

@@ -2,4 +2,6 @@
 
 from types import ModuleType
 
-STUDIES: tuple[ModuleType, ...] = ()
+from verification.cable import statics
+
+STUDIES: tuple[ModuleType, ...] = (statics,)

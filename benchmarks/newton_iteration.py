@@ -1,0 +1,74 @@
+"""Time of one Newton iteration of a cable of 20 elements: residual, and solution with a kept factorisation.
+
+Generalized-alpha has one real stage, collocation two stages and one complex solution. Prints microseconds, each the
+least of several repetitions.
+"""
+
+from __future__ import annotations
+
+from collections.abc import Callable
+from time import perf_counter
+
+import numpy as np
+
+from fmus import banded
+from fmus.cable import dynamics
+from fmus.cable.assembly import constrain_vector, iteration_matrix
+from fmus.cable.module import Cable
+from fmus.jit import kernel
+
+REPEAT, NUMBER = 20, 500
+TARGET = 15.0
+"""Microseconds of a real iteration that are aimed at."""
+
+
+@kernel
+def _residuals(model, q, v, work, number):
+    """Evaluate the residual of one stage a number of times."""
+    for _ in range(number):
+        dynamics.residual(model, q, v, work.a[0], work.external, work.residual[0], work.axial, work.element)
+        constrain_vector(model, work.residual[0])
+
+
+@kernel
+def _solutions(band, x, number):
+    """Solve a number of times."""
+    for _ in range(number):
+        for i in range(x.size):
+            x[i] = 1.0
+        banded.solve(band, x)
+
+
+def microseconds(call: Callable[[], object]) -> float:
+    """Return the least time of `call`, which repeats what is measured NUMBER times, for one of them."""
+    call()
+    times = []
+    for _ in range(REPEAT):
+        start = perf_counter()
+        call()
+        times.append(perf_counter() - start)
+    return 1e6 * min(times) / NUMBER
+
+
+def main() -> None:
+    cable = Cable()
+    cable.initialize(0.0)
+    model, work = cable.model, dynamics.make_work(cable.model.weight.size, cable.state.size)
+    n, h = model.weight.size, 0.0025
+    q, v = cable.state[:n].copy(), np.zeros(n)
+    z = h * (0.25 + 0.14j)
+    iteration_matrix(model, q, v, 1.0, 0.5 * h, 0.25 * h * h, work.real_band, work.real_matrix, work.element)
+    iteration_matrix(model, q, v, 1.0 + 0.0j, z, z * z, work.band, work.matrix, work.element)
+    banded.factorise(work.real_band)
+    banded.factorise(work.band)
+    residual = microseconds(lambda: _residuals(model, q, v, work, NUMBER))
+    real = microseconds(lambda: _solutions(work.real_band, work.increment, NUMBER))
+    both = microseconds(lambda: _solutions(work.band, work.mode, NUMBER))
+    print(f"residual of a stage          {residual:6.2f} µs")
+    print(f"solution, real / complex     {real:6.2f} / {both:.2f} µs")
+    print(f"iteration, generalized-alpha {residual + real:6.2f} µs (aim: {TARGET:g} µs)")
+    print(f"iteration, collocation       {2 * residual + both:6.2f} µs (two stages)")
+
+
+if __name__ == "__main__":
+    main()
