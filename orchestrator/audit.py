@@ -184,6 +184,5 @@ def _sources(table: Table, terms: Mapping[str, np.ndarray]) -> dict[str, np.ndar
     found = {c: own[c] - sum(work[sides[c].format(k)] for k in numbers) for c in ("cable", "robot")}
     for k, contact in zip(numbers, contacts, strict=True):
         found[contact] = own[contact] + sum(work[name.format(k)] for name in booked.values())
-        for side, name in sides.items():
-            found[f"interface {side}-{contact}"] = work[name.format(k)] - work[booked[side].format(k)]
+        found[f"interface {contact}"] = sum(work[sides[s].format(k)] - work[booked[s].format(k)] for s in sides)
     return found

@@ -28,12 +28,12 @@ N_ROBOT = 10
 """Accelerations of the robot: centre of mass 3, angular velocity 3, spin of four wheels."""
 S, SLIP, WALLS, FRICTION, LEFT, STATUS, STORED = 0, 1, 3, 4, 5, 6, 9
 N_CONTACT = 10
-"""Memory of a contact: arc length, bristle (2), energy dissipated by walls and by friction, left the groove, regime at the
-last step's end and at its stages (2), elastic energy of the walls at its end."""
+"""Memory of a contact: arc length, bristle (2), energy dissipated by walls and by friction, left the groove, regime
+at the last step's end and at its stages (2), elastic energy of the walls at its end."""
 EXCESS = 27
 """Place in the law's results, free there: the bristle's force beyond the Coulomb limit, N."""
 FOOT_ITERATIONS = 2
-"""From the last iterate; each one shrinks the error by the cable's curvature times the wheel's distance, 1e-2 or less."""
+"""From the last iterate; each shrinks the error by the cable's curvature times the wheel's distance, 1e-2 or less."""
 MAX_ITERATIONS = 15
 SLOW = 0.2
 ERROR_FACTOR = 0.01
@@ -72,6 +72,7 @@ class State(NamedTuple):
     robot: np.ndarray
     accelerations: np.ndarray
     contacts: np.ndarray
+    control_work: np.ndarray  # (1,) J
 
 
 class Space(NamedTuple):
@@ -121,7 +122,7 @@ def make_space(n: int, n_wheels: int) -> Space:
         z((n_wheels, 8)), z(n_wheels, dtype=np.int64), z((N_ROBOT, n), dtype=c), z((n_wheels, N_ROBOT, 12), dtype=c),
         z((N_ROBOT, N_ROBOT), dtype=c), z(N_ROBOT, dtype=np.int64), z(N_ROBOT, dtype=c),
         z(N_ROBOT), z((n_wheels, 2)), z((2, n_wheels)),
-        State(z(state_size(n)), z(rb.RIGID), z((2, N_ROBOT)), z((n_wheels, N_CONTACT))),
+        State(z(state_size(n)), z(rb.RIGID), z((2, N_ROBOT)), z((n_wheels, N_CONTACT)), z(1)),
     )  # fmt: skip
 
 
@@ -239,8 +240,8 @@ def _cable_points(system, q, v, arcs, points, shape):
 def _follow(system, q, robot, arcs, space, shape):
     """Move every arc length in `arcs` (n_wheels,) to the foot of its wheel on the cable; return OK or OFF_CABLE.
 
-    The law takes the cable for a straight line. At the foot itself that costs nothing; at a distance x from it, it would be
-    wrong by curvature x²/2, which in every step would add that times the contact force to the energy.
+    The law takes the cable for a straight line. At the foot itself that costs nothing; at a distance x from it, it
+    would be wrong by curvature x²/2, which in every step would add that times the contact force to the energy.
     """
     motion, status = space.motion, OK
     for k in range(arcs.size):
@@ -540,6 +541,9 @@ def _accept(system, state, h, space, work):
     state.cable[4 * n + DISSIPATED] += h * (method.b[0] * work.power[0] + method.b[1] * work.power[1])
     state.cable[4 * n + LAST_INNER] = h
     r, b = state.robot, space.b
+    for j in range(2):
+        power = rb.control_power(system.robot, space.stage[j], system.control)
+        state.control_work[0] += h * method.b[j] * power
     rate = space.quaternions
     for j in range(2):
         _rotation_rate(space.theta[j], space.stage[j, 10:13], rate[j])
@@ -562,7 +566,7 @@ def _accept(system, state, h, space, work):
 
 @kernel
 def _regime(prm, out):
-    """Return the piece of the contact law that is at work: its status, and whether bristle and damper are at their limit.
+    """Return the piece of the contact law at work: its status, and whether bristle and damper are at their limit.
 
     Where it changes the friction has a kink. A step across one would be less accurate than its error estimate says.
     """
@@ -700,10 +704,16 @@ def step(system, state, h, tolerance, fresh, space, work, allowed, event):
 @kernel
 def _copy(source, target):
     """Write one state over another."""
-    target.cable[:] = source.cable
-    target.robot[:] = source.robot
-    target.accelerations[:, :] = source.accelerations
-    target.contacts[:, :] = source.contacts
+    for i in range(source.cable.size):
+        target.cable[i] = source.cable[i]
+    for i in range(source.robot.size):
+        target.robot[i] = source.robot[i]
+    target.control_work[0] = source.control_work[0]
+    for i in range(N_ROBOT):
+        target.accelerations[0, i], target.accelerations[1, i] = source.accelerations[0, i], source.accelerations[1, i]
+    for k in range(source.contacts.shape[0]):
+        for i in range(N_CONTACT):
+            target.contacts[k, i] = source.contacts[k, i]
 
 
 @kernel
