@@ -57,7 +57,7 @@ def collocation(spectral_radius: float) -> Collocation:
     a = np.stack([c, c**2 / 2], axis=1) @ np.linalg.inv(powers)
     b = np.array([1.0, 0.5]) @ np.linalg.inv(powers)
     values, vectors = np.linalg.eig(a)
-    k = int(np.argmax(values.imag))
+    k = int(np.argmax(np.imag(values)))
     order = [k, 1 - k]
     inverse = np.linalg.inv(vectors[:, order])
     line = np.linalg.inv(powers)

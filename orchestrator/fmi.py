@@ -89,9 +89,15 @@ class Fmi2:
         self.slave.instantiate(callbacks=callbacks, loggingOn=True)
 
     def _raw(self, function: str, *arguments: Any) -> Callable[..., int]:
-        """Return a function of the library with its instance filled in."""
+        """Return a function of the library with its instance filled in; what is missing there answers with an error."""
+        if not hasattr(self.slave.dll, function):
+            return lambda *_: self._missing(function)
         prototype = CFUNCTYPE(c_int, c_void_p, *arguments)
         return partial(prototype((function, self.slave.dll)), self.component)
+
+    def _missing(self, function: str) -> int:
+        self.sink(ERROR, f"the library has no {function}")
+        return ERROR
 
     def accessor(self, verb: str, kind: str, vr: np.ndarray, values: np.ndarray) -> Call:
         """Return the call that gets or sets (`verb`) all of `vr` (n,) from or into `values` (m,); both are

@@ -181,7 +181,7 @@ class Group:
     values : (n,) float64; integers and Booleans are cast
     """
 
-    __slots__ = ("fmu", "names", "ones", "runs", "values")
+    __slots__ = ("_get", "_set", "fmu", "names", "ones", "runs", "values")
 
     def __init__(self, fmu: Fmu, names: Sequence[str], values: np.ndarray | None = None):
         self.fmu, self.names = fmu, tuple(names)
@@ -203,23 +203,34 @@ class Group:
             _Run(fmu, kind, [ports[i] for i in pick], pick, self.values) for kind, pick in picks.items()
         ]
 
+        # one direct run is the common case: its call is used as it is
+        direct = len(self.runs) == 1 and self.runs[0].direct
+        self._get: Call = self.runs[0].get_call if direct else self._get_runs
+        self._set: Call = self.runs[0].set_call if direct else self._set_runs
+
+    def _get_runs(self) -> int:
+        return max((run.get() for run in self.runs), default=0)
+
+    def _set_runs(self) -> int:
+        return max((run.set() for run in self.runs), default=0)
+
     def get(self) -> None:
         """Read all from the FMU into `values`."""
-        for run in self.runs:
-            status = run.get()
-            if status > WARNING:
-                raise self.fmu.error(status, f"reading {self.names[0]} … {self.names[-1]}")
+        status = self._get()
+        if status > WARNING:
+            raise self.fmu.error(status, f"reading {self.names[0]} … {self.names[-1]}")
 
     def set(self) -> None:
         """Write all of `values` to the FMU."""
-        for run in self.runs:
-            status = run.set()
-            if status > WARNING:
-                raise self.fmu.error(status, f"writing {self.names[0]} … {self.names[-1]}")
+        status = self._set()
+        if status > WARNING:
+            raise self.fmu.error(status, f"writing {self.names[0]} … {self.names[-1]}")
 
     def get_finite(self) -> None:
         """Read all; raise `FmuError` if a value is not finite."""
-        self.get()
+        status = self._get()
+        if status > WARNING:
+            raise self.fmu.error(status, f"reading {self.names[0]} … {self.names[-1]}")
         total = self.values.dot(self.ones)
         if not -np.inf < total < np.inf:
             self._name_not_finite()

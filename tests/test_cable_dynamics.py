@@ -1,4 +1,7 @@
-"""The cable in motion: order in the step, energy, waves, damping, a point mass, replay; sources in `verification/cable`."""
+"""The cable in motion: order in the step, energy, waves, damping, a point mass, replay.
+
+Where the expected values come from is said in `verification/cable`.
+"""
 
 import numpy as np
 import pytest

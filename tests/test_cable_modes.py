@@ -27,7 +27,7 @@ def test_twenty_elements():
 
 
 def test_irvine():
-    """Theory for λ² = 24: 0.38936, 0.77873 Hz out of plane, 0.66231 Hz in plane; ours differ by the square of the sag."""
+    """Theory, λ² = 24: 0.38936, 0.77873 Hz out of plane, 0.66231 Hz in plane; ours differ by the square of the sag."""
     out, plane = vibration.irvine(TABLE1, 4)
     assert out[:2] == pytest.approx([0.38936, 0.77873], abs=1e-5) and plane[0] == pytest.approx(0.66231, abs=1e-5)
     for row in [*vibration.direct_irvine_rows(), *vibration.irvine_rows(60)]:

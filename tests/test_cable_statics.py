@@ -1,4 +1,4 @@
-"""The cable at rest, held against independent solutions (`verification/cable`); and what it does where there is none."""
+"""The cable at rest, held against independent solutions (`verification/cable`), and where there is none."""
 
 import re
 from pathlib import Path

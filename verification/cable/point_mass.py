@@ -104,7 +104,7 @@ def modal_height(theory: Taut, s: float, weight: float, times: np.ndarray, count
 
 
 def talbot(transform: Callable[[np.ndarray], np.ndarray], times: np.ndarray, n: int = 32) -> np.ndarray:
-    """Return the inverse Laplace transform at `times`: trapezoidal rule on Talbot's contour (Weideman 2006, SIAM J. Numer. Anal.)."""
+    """Return the inverse Laplace transform at `times`: trapezoidal rule on Talbot's contour (Weideman 2006)."""
     theta = (2.0 * np.arange(n) + 1.0) * np.pi / n - np.pi
     z = n * (0.5017 * theta / np.tan(0.6407 * theta) - 0.6122 + 0.2645j * theta)
     dz = n * (0.5017 / np.tan(0.6407 * theta) - 0.5017 * 0.6407 * theta / np.sin(0.6407 * theta) ** 2 + 0.2645j)

@@ -75,7 +75,7 @@ CASES = [
 
 
 def computed(case: Case, n_elements: int, grading: float) -> tuple[float, float, float]:
-    """Return sag (m) under the load or at midspan, force of the left support (N), slope (rad) there; in clamps, at 1/4."""
+    """Return sag (m) under the load or at midspan, left support's force (N), slope (rad) there; in clamps, at 1/4."""
     settings, s = case.settings, _sag_at(case)
     model, q = loaded_equilibrium(
         settings,
@@ -136,7 +136,7 @@ def strain_measure_rows() -> list[Row]:
 
 
 def catenary_rows() -> list[Row]:
-    """Return the cable of vanishing bending stiffness beside the catenary of the same strain measure, level and inclined."""
+    """Return the cable of vanishing bending stiffness beside the catenary of the same strain measure."""
     found = []
     for inclined in (False, True):
         case = Case("table1", inclined=inclined)

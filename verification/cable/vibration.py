@@ -62,7 +62,7 @@ def flatter(factor: float) -> Settings:
 
 
 def irvine_rows(n_elements: int = 120) -> list[Row]:
-    """Return the difference from Irvine's frequencies at a sag of 1/1600 of the span, and the rate at which it vanishes."""
+    """Return how far we are from Irvine's frequencies at a sag of 1/1600 of the span, and the rate of that."""
     factors, differences = (4.0, 8.0, 16.0), []
     for factor in factors:
         settings = flatter(factor)
