@@ -1,12 +1,13 @@
 """Large rotations: a cantilever under a tip force, and one rolled up by a tip moment.
 
-L = 2 m, E = 2.07e11 Pa, 0.1 m × 0.1 m. Under the dead tip force 3 EI/L² the engineering-strain model gives the tip displacement
-(-0.508537304326, -1.207239854550) m; the value for this project's measures, Green–Lagrange strain and |r_x × r_xx|, follows
-from the same boundary-value problem by shooting (`verification/cable/beam.py`), which is checked against the former first.
+L = 2 m, E = 2.07e11 Pa, 0.1 m × 0.1 m. Under the dead tip force 3 EI/L² the engineering-strain model gives the tip
+displacement (-0.508537304326, -1.207239854550) m; the value for this project's measures, Green–Lagrange strain and
+|r_x × r_xx|, follows from the same boundary-value problem by shooting (`verification/cable/beam.py`), which is
+checked against the former first.
 
-Under a tip moment M the stretch λ and θ' are constant: ∂W/∂λ = 0 gives λ² (1 + 4 (EI/EA) θ'²) = 1, and M = EI λ⁴ θ'. With
-M = 2π EI/L a beam that cannot stretch rolls up into a circle; ours turns by θ' L, a little more, by a term that
-vanishes with the square of the depth over the radius.
+Under a tip moment M the stretch λ and θ' are constant: ∂W/∂λ = 0 gives λ² (1 + 4 (EI/EA) θ'²) = 1, and M = EI λ⁴
+θ'. With M = 2π EI/L a beam that cannot stretch rolls up into a circle; ours turns by θ' L, a little more, by a term
+that vanishes with the square of the depth over the radius.
 """
 
 from __future__ import annotations

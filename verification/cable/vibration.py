@@ -1,11 +1,12 @@
 """Natural frequencies and damping ratios about the equilibrium, out of the vertical plane and in it.
 
 Three references. (1) Rayleigh–Ritz with polynomials on the second variation of the energy about the boundary-value
-solution (`verification/cable/beam.py`): the same mechanics, another method. (2) Irvine & Caughey 1974: a parabolic cable
-of small sag without bending stiffness; in plane, symmetric, tan(Ω/2) = Ω/2 - 4/λ² (Ω/2)³, λ² = (wL/H)² EA L/(H L_e), L_e = L (1 + (wL/H)²/8).
-It neglects terms of the square of the sag ratio: λ² = 24 is kept while the sag falls, and the difference must vanish
-with that square. (3) The tensioned beam, f_n = n/(2L) √(T/ρA) √(1 + n²π² EI/(T L²)), with Kelvin–Voigt damping
-ratio c EI β⁴/(2 ρA ω), β = nπ/L, as the tension is not damped; out of plane, where sag acts by its square only.
+solution (`verification/cable/beam.py`): the same mechanics, another method. (2) Irvine & Caughey 1974: a parabolic
+cable of small sag without bending stiffness; in plane, symmetric, tan(Ω/2) = Ω/2 - 4/λ² (Ω/2)³, λ² = (wL/H)² EA
+L/(H L_e), L_e = L (1 + (wL/H)²/8). It neglects terms of the square of the sag ratio: λ² = 24 is kept while the sag
+falls, and the difference must vanish with that square. (3) The tensioned beam, f_n = n/(2L) √(T/ρA) √(1 + n²π²
+EI/(T L²)), with Kelvin–Voigt damping ratio c EI β⁴/(2 ρA ω), β = nπ/L, as the tension is not damped; out of plane,
+where sag acts by its square only.
 """
 
 from __future__ import annotations
@@ -61,7 +62,7 @@ def flatter(factor: float) -> Settings:
 
 
 def irvine_rows(n_elements: int = 120) -> list[Row]:
-    """Return the difference from Irvine's frequencies at a sag of 1/1600 of the span, and the rate at which it vanishes."""
+    """Return how far we are from Irvine's frequencies at a sag of 1/1600 of the span, and the rate of that."""
     factors, differences = (4.0, 8.0, 16.0), []
     for factor in factors:
         settings = flatter(factor)
