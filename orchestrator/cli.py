@@ -201,12 +201,19 @@ def modes(
     table = Table("mode", "out of plane \\[Hz]", "damping", "in plane \\[Hz]", "damping", box=None, pad_edge=False)
     groups = (found.out_of_plane, found.in_plane)
     for k in range(max(group.frequency.size for group in groups)):
-        cells = [(f"{g.frequency[k]:.6g}", f"{g.damping_ratio[k]:.3g}") if k < g.frequency.size else ("", "") for g in groups]
+        cells = [_mode_cells(group, k) for group in groups]
         table.add_row(str(k + 1), *cells[0], *cells[1])
     _print(table)
     if path is not None:
         vibration.write(found, path)
         print(f"table and picture in {path}")
+
+
+def _mode_cells(group: Any, k: int) -> tuple[str, str]:
+    """Return frequency and damping ratio of mode k (from 0) in words, or nothing."""
+    if k >= group.frequency.size:
+        return "", ""
+    return f"{group.frequency[k]:.6g}", f"{group.damping_ratio[k]:.3g}"
 
 
 @app.command()
@@ -281,6 +288,9 @@ def _status(runs: list[Coupled], within: bool) -> int:
     for coupled in runs:
         for contact in coupled.fallen:
             _complain(f"{contact}: the cable left the groove; the robot has fallen off")
+        drift = coupled.energy.warning() if coupled.energy is not None else None
+        if drift is not None:
+            _complain(f"{coupled.label}: {drift}")
         if coupled.log.error is not None:
             _complain(f"{coupled.label}: {coupled.log.error}; the results up to there are kept")
             status = INTERRUPTED if isinstance(coupled.log.error, Interruption) else FAILED
@@ -302,6 +312,8 @@ def _print_run(coupled: Coupled) -> None:
         f"{coupled.master}, macro step {log.macro_step:g} s: {len(log.steps)} steps, "
         f"{log.iterations_per_step:.2f} iterations a step, {log.unconverged} unconverged, {log.wall:.2f} s"
     )
+    if coupled.energy is not None:
+        print(f"energy drift: {coupled.energy.drift:.2g} J of {coupled.energy.exchanged:.3g} J exchanged")
 
 
 def _print_comparison(comparison: Comparison) -> None:
@@ -311,6 +323,11 @@ def _print_comparison(comparison: Comparison) -> None:
 
     reference = comparison.reference
     print(f"reference: {reference.kind}, {reference.wall_s:.2f} s")
+    energy = comparison.reference_energy
+    if energy is not None:
+        print(f"reference's energy drift: {energy.drift:.2g} J of {energy.exchanged:.3g} J exchanged")
+        if (warning := energy.warning()) is not None:
+            _complain(f"reference: {warning}")
     costs = Table(
         "master", "H \\[s]", "iterations", "unconverged", "cable steps", "wall \\[s]", box=None, pad_edge=False
     )

@@ -8,13 +8,14 @@ from typing import Any
 
 import numpy as np
 
+from orchestrator.audit import Audit, of_monolithic
 from orchestrator.results import Table
 
 REFERENCE_MARGIN = 0.1
 """The reference's own error may be this part of a tolerance, or the verdict means nothing."""
 CONSTANT = 1e-6
-"""A signal whose reference moves by less than this (m, rad …) counts as constant: the verdict then takes this as its scale, as
-for the roll of a landing at midspan, which is zero by symmetry."""
+"""A signal whose reference moves by less than this (m, rad …) counts as constant: the verdict then takes this as its
+scale, as for the roll of a landing at midspan, which is zero by symmetry."""
 
 
 @dataclass(frozen=True)
@@ -99,6 +100,11 @@ class Comparison:
         ]
 
     @property
+    def reference_energy(self) -> Audit | None:
+        """The reference's energy audit; None where it does not show its energy."""
+        return of_monolithic(self.reference.table, self.reference.estimated_error)
+
+    @property
     def passed(self) -> bool:
         """Whether every run meets every tolerance."""
         return all(check.passed for check in self.checks)
@@ -125,6 +131,7 @@ class Comparison:
             "observed_order": self.observed_order,
             "tolerance": self.tolerance,
             "verdict": "pass" if self.passed else "fail",
+            "reference_energy": self.reference_energy.content() if self.reference_energy else None,
         }
 
     @classmethod

@@ -16,7 +16,7 @@ from typing import Any
 import numpy as np
 
 from fmus.variables import ModuleError
-from orchestrator import landing, library, monolithic, vocabulary
+from orchestrator import audit, landing, library, monolithic, vocabulary
 from orchestrator.compare import (
     Comparison,
     Reference,
@@ -91,6 +91,11 @@ class Coupled:
     def record(self) -> Record:
         """What the pictures are drawn from."""
         return Record(self.master, self.log.macro_step, self.table, self.steps_table, self.fields)
+
+    @property
+    def energy(self) -> audit.Audit | None:
+        """The energy audit; None where a component does not show its energy."""
+        return audit.of_coupled(self.table, self.scenario.simulation.tolerances.values())
 
     @property
     def fallen(self) -> list[str]:
@@ -323,10 +328,18 @@ def summary(coupled: Coupled) -> dict[str, Any]:
         "iterations_per_step": log.iterations_per_step,
         "unconverged_steps": log.unconverged,
         "left_the_groove": coupled.fallen,
+        "energy": energy_content(coupled),
         "interface_work_J": {name: float(work[-1]) for name, work in log.energy.items()},
         "interface_balance": landing.interface_balance(coupled.table, log.energy),
         "extremes": {n: _extremes(log.time, values) for n, values in coupled.table.items() if n != "time"},
     }
+
+
+def energy_content(coupled: Coupled) -> dict[str, Any]:
+    """Return what ``summary.json`` says of the energy."""
+    if coupled.energy is not None:
+        return coupled.energy.content()
+    return {"verdict": None, "missing": audit.missing(coupled.table)} if coupled.scenario.is_landing else {}
 
 
 def _extremes(time: np.ndarray, values: np.ndarray) -> dict[str, float]:
@@ -348,8 +361,8 @@ def write(directory: RunDirectory, coupled: Coupled, reference: Reference | None
     if coupled.fields:
         directory.write_fields("fields.h5", coupled.fields, FIELD_UNITS)
     directory.write_json("summary.json", summary(coupled))
-    signals = list(coupled.scenario.simulation.tolerances)
-    draw_run(directory.path, coupled.record, reference.table if reference else None, signals)
+    tolerances = coupled.scenario.simulation.tolerances
+    draw_run(directory.path, coupled.record, reference.table if reference else None, tolerances)
     error = coupled.log.error
     directory.write_manifest(manifest(coupled.scenario, coupled.fmus), error=str(error) if error else None)
 

@@ -96,7 +96,8 @@ def _placed(scenario: Scenario) -> tuple[Problem, Placement]:
         _assign(cable.table, cable.values, _shown(scenario.cable.fmu, cable.table) | resolved.cable)
         cable.initialize(0.0)
         robot = Robot(resolved.n_wheels)
-        _assign(robot.table, robot.values, _shown(scenario.robot.fmu, robot.table) | resolved.robot)
+        settings = resolved.robot | scenario.robot.inputs
+        _assign(robot.table, robot.values, _shown(scenario.robot.fmu, robot.table) | settings)
         if scenario.robot.fmu is not None:
             _look_at(robot, Path(scenario.robot.fmu), resolved)
         contact = _contact(scenario, 0.0)
@@ -159,7 +160,7 @@ def graph(scenario: Scenario, exchange: str) -> Graph:
         initial = {n: v for n, v in placement.initial.items() if n in components["robot"].ports}
         if not all(f"initial.position.{axis}" in initial for axis in "yz"):
             raise InputError(f"{robot}: has no parameters initial.position.*: the robot cannot be placed")
-        components["robot"].set_parameters(dict(scenario.robot.parameters) | initial)
+        components["robot"].set_parameters(dict(scenario.robot.parameters) | initial | scenario.robot.inputs)
         if exchange == "waveform" and not _gives_means(components):
             exchange = "hermite"
         for k, s in enumerate(placement.arc_lengths, start=1):

@@ -151,7 +151,10 @@ def write(found: CableModes, directory: Path) -> None:
 
 
 def draw(found: CableModes, path: Path) -> None:
-    """Draw the shapes over the span: displacement across the plane on the left, vertical and along the span on the right."""
+    """Draw the shapes over the span.
+
+    Displacement across the plane on the left, vertical and along the span on the right.
+    """
     import matplotlib.pyplot as plt
 
     from orchestrator.plots import BLUE, STYLE, VERMILION

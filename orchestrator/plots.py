@@ -21,6 +21,7 @@ from matplotlib.axes import Axes
 from matplotlib.figure import Figure
 from matplotlib.ticker import LogLocator, MaxNLocator, NullLocator
 
+from orchestrator.audit import Audit
 from orchestrator.compare import Comparison, matching_rows
 from orchestrator.results import Table, replacing
 
@@ -271,6 +272,30 @@ def shapes(path: Path, fields: Mapping[str, np.ndarray], run: Table) -> None:
         change.margins(x=0.01)
         figure.align_ylabels()
         figure.legend(*shape.get_legend_handles_labels(), loc="outside right center", title="Time")
+
+
+def energy(path: Path, audit: Audit) -> None:
+    """Draw the energy's terms over time, and below them the drift of their sum with its sources."""
+    residual = np.abs(audit.residual)
+    with _figure(path, (6.4, 5.2)) as figure:
+        terms, drift = figure.subplots(2, 1, sharex=True, height_ratios=(3, 2))
+        for (label, values), colour in zip(audit.groups.items(), _cycle(COLOURS), strict=False):
+            terms.plot(audit.time, values, color=colour, linewidth=1.0, label=label)
+        terms.plot(audit.time, audit.residual, color=BLACK, linewidth=1.0, linestyle="--", label="Sum")
+        terms.set_ylabel("Change of energy [J]")
+        drift.semilogy(audit.time, _above_zero(residual), color=BLACK, linewidth=1.2, label="Sum")
+        sources = {name: np.abs(values) for name, values in audit.sources.items() if np.any(values)}
+        for (name, values), colour in zip(sources.items(), _cycle(COLOURS), strict=False):
+            drift.semilogy(audit.time, _above_zero(values), color=colour, linewidth=0.8, label=name)
+        if np.isfinite(audit.allowed):
+            drift.axhline(audit.allowed, color=GREY, linewidth=0.9, linestyle=":", label="allowed")
+        drift.set_ylim(1e-5 * max(float(np.max(residual)), 1e-12), 10.0 * max(float(np.max(residual)), 1e-12))
+        drift.set_ylabel("|Drift| [J]")
+        drift.set_xlabel("Time [s]")
+        for axis in (terms, drift):
+            axis.margins(x=0.0)
+            axis.legend(loc="center left", bbox_to_anchor=(1.01, 0.5))
+        figure.align_ylabels()
 
 
 def _telling_instants(run: Table, time: np.ndarray) -> list[int]:

@@ -2,7 +2,7 @@
 
 from __future__ import annotations
 
-from collections.abc import Iterable, Sequence
+from collections.abc import Iterable, Mapping, Sequence
 from dataclasses import dataclass, field
 from html import escape
 from pathlib import Path
@@ -46,18 +46,21 @@ def run_label(master: str, macro_step: float) -> str:
     return f"{master}_{macro_step:g}s"
 
 
-def draw_run(directory: Path, record: Record, reference: Table | None, signals: Sequence[str]) -> None:
-    """Draw the pictures of one run into ``plots``; `signals` are those a general graph is judged by."""
-    from orchestrator import plots
+def draw_run(directory: Path, record: Record, reference: Table | None, tolerances: Mapping[str, float]) -> None:
+    """Draw the pictures of one run into ``plots``; `tolerances` are those of the signals that it is judged by."""
+    from orchestrator import audit, plots
 
     if len(record.table["time"]) < 2:
         return
     folder = directory / "plots"
-    panels = plots.panels_for(record.table, reference, signals)
+    panels = plots.panels_for(record.table, reference, list(tolerances))
     plots.overview(folder / "overview.png", record.table, reference, panels)
     plots.iterations(folder / "iterations.png", {record.legend: record.steps})
     if record.fields and "robot.body.position.z" in record.table:
         plots.shapes(folder / "shapes.png", record.fields, record.table)
+    energy = audit.of_coupled(record.table, tolerances.values())
+    if energy is not None:
+        plots.energy(folder / "energy.png", energy)
 
 
 def draw_comparison(directory: Path, comparison: Comparison, records: Sequence[Record]) -> None:
@@ -83,7 +86,7 @@ def report(directory: Path) -> Path:
     if not (directory / "manifest.json").is_file():
         raise InputError(f"{directory}: no manifest.json; it is not the directory of a finished run")
     manifest = read_json(directory / "manifest.json")
-    signals = list(manifest["resolved"]["simulation"]["tolerances"])
+    tolerances = manifest["resolved"]["simulation"]["tolerances"]
     if (directory / "comparison.json").is_file():
         content = read_json(directory / "comparison.json")
         comparison = Comparison.from_content(content, read_table(directory / "reference.csv"))
@@ -91,7 +94,7 @@ def report(directory: Path) -> Path:
         draw_comparison(directory, comparison, [read_record(directory / label) for label in labels])
         rows = _comparison_rows(comparison)
     else:
-        draw_run(directory, read_record(directory), None, signals)
+        draw_run(directory, read_record(directory), None, tolerances)
         rows = _summary_rows(read_json(directory / "summary.json"))
     return _write_page(directory, manifest, rows)
 
@@ -131,7 +134,9 @@ def verdict_word(passed: bool, note: str = "") -> str:
 def _summary_rows(summary: dict[str, Any]) -> list[tuple[str, ...]]:
     shown = ("robot", "stiffness_set", "master", "exchange", "macro_step", "simulated_s", "wall_s")
     shown += ("iterations_per_step", "unconverged_steps", "left_the_groove")
-    return [("what", "value"), *((name, str(summary[name])) for name in shown)]
+    energy = summary.get("energy") or {}
+    rows = [("energy " + name, str(energy[name])) for name in ("drift_J", "exchanged_J", "verdict") if name in energy]
+    return [("what", "value"), *((name, str(summary[name])) for name in shown), *rows]
 
 
 def _write_page(directory: Path, manifest: dict[str, Any], rows: list[tuple[str, ...]]) -> Path:

@@ -72,11 +72,15 @@ class CableSection(Section):
 
 
 class RobotSection(Section):
-    """The robot: one of the catalogue (`model`) or any FMU that meets the contract (`fmu`)."""
+    """The robot: one of the catalogue (`model`) or any FMU that meets the contract (`fmu`).
+
+    `inputs` are held over the whole run: thrust, control torque, drive torques of the wheels.
+    """
 
     model: str | None = None
     fmu: str | None = None
     parameters: Settings = {}
+    inputs: Settings = {}
 
     @model_validator(mode="after")
     def _one_robot(self) -> RobotSection:

@@ -23,7 +23,11 @@ from orchestrator.monolithic.system import N_CONTACT, N_ROBOT, State, System
 LONGEST = 1.4e-3
 """s; longest step at the default tolerance, it resolves the cable's waves (docs/verification.md)."""
 EVENT = 6e-5
-"""s; longest step at the default tolerance in which a contact may open, close, begin or cease to slide."""
+"""s; longest step at the default tolerance in which a contact may open, close, begin or cease to slide.
+
+What such a step gets wrong depends on where in it the event falls. For the estimate it shrinks faster than the other
+steps do, so that the coarser solution, whatever the chance, is the one that is wrong.
+"""
 TOLERANCE = 1e-9
 """m, local error of the robot's position a step allowed by default."""
 NEWTON = 1e-12
@@ -79,12 +83,13 @@ class Integrator:
         self.system = System(cable.model, self.method, prm, contacts, _control(robot, n_wheels))
         memory = np.zeros((n_wheels, N_CONTACT))
         memory[:, kernels.S] = [c.values[c.table.index["initial.s"]] for c in problem.contacts]
-        self.state = State(cable.state.copy(), initial_state(robot.values, robot.table), np.zeros((2, N_ROBOT)), memory)
+        start = initial_state(robot.values, robot.table)
+        self.state = State(cable.state.copy(), start, np.zeros((2, N_ROBOT)), memory, np.zeros(1))
         self.work = dynamics.make_work(cable.model.weight.size, cable.state.size)
         self.space = kernels.make_space(cable.model.weight.size, n_wheels)
         self.refinement = refinement
         self.longest = LONGEST * (tolerance / TOLERANCE) ** 0.25
-        event = EVENT * (tolerance / TOLERANCE) ** 0.25
+        event = EVENT * (tolerance / TOLERANCE) ** 0.5
         self.control = np.array([0.02 * self.longest, self.longest, tolerance, event, NEWTON, 0.0, 0.0, 0.0, 0.0])
         if kernels.settle(self.system, self.state, False, self.space, self.work) != kernels.OK:
             raise ModuleError("monolithic: the contact law fails at the start; check the initial pose of the robot")
@@ -101,8 +106,8 @@ class Integrator:
         status, reached = kernels.advance(self.system, self.state, self.control, t, end, self.space, self.work)
         if status == kernels.OFF_CABLE:
             raise ModuleError(
-                f"monolithic: a wheel has run past a support, off the cable, at t = {reached:g} s; stop the run earlier, "
-                "or brake the robot"
+                f"monolithic: a wheel has run past a support, off the cable, at t = {reached:g} s; "
+                "stop the run earlier, or brake the robot"
             )
         if status != kernels.OK:
             raise ModuleError(
@@ -166,6 +171,7 @@ class _Recorder:
         self.cable.show()
         self.cable_rows[i] = self.cable.values[self.cable_at]
         self._robot_state[: rigid_body.RIGID] = state.robot
+        self._robot_state[rigid_body.CONTROL_WORK] = state.control_work[0]
         follow_euler(state.robot[3:7], self._angles)
         values = np.zeros(rigid_body.BODY_OUTPUTS + rigid_body.WHEEL_OUTPUTS * self.robot.n_wheels)
         rigid_body.outputs(system.robot, self._robot_state, values)
@@ -220,10 +226,11 @@ def solve(
 ) -> Solution:
     """Solve, and estimate the error by a second solution whose steps are twice as long.
 
-    The tolerance alone would not tell: where the cable's waves or the output times limit the steps, both solutions would
-    take the same ones. So the finer one divides every interval into an even number, of which the coarser one takes half,
-    at a tolerance 2⁴ times as wide (the local error is of fourth order). The estimate is the whole difference of the two.
-    With the order p of convergence the true error is 1/(2^p - 1) of it: a bound for p >= 1. Parameters as in `integrate`.
+    The tolerance alone would not tell: where the cable's waves or the output times limit the steps, both solutions
+    would take the same ones. So the finer one divides every interval into an even number, of which the coarser one
+    takes half, at a tolerance 2⁴ times as wide (the local error is of fourth order). The estimate is the whole
+    difference of the two. With the order p of convergence the true error is 1/(2^p - 1) of it: a bound for p >= 1.
+    Parameters as in `integrate`.
     """
     fine = integrate(make, times, tolerance, progress, refinement=2)
     if not estimate:

@@ -16,7 +16,7 @@ import numpy as np
 
 from fmus import banded
 from fmus.cable.assembly import HALF_BANDWIDTH, Model, constrain_vector, interpolate, iteration_matrix, locate
-from fmus.cable.dynamics import DISSIPATED, LAST_INNER, residual
+from fmus.cable.dynamics import DISSIPATED, LAST_INNER, residual, state_size
 from fmus.contact import law
 from fmus.contact.exchange import silence
 from fmus.jit import kernel
@@ -26,17 +26,21 @@ from fmus.time_integration import Collocation
 
 N_ROBOT = 10
 """Accelerations of the robot: centre of mass 3, angular velocity 3, spin of four wheels."""
-S, SLIP, WALLS, FRICTION, LEFT, STATUS, STORED = 0, 1, 3, 4, 5, 6, 7
-N_CONTACT = 8
-"""Memory of a contact: arc length, bristle (2), energy dissipated by walls and by friction, left the groove, status,
-elastic energy of the walls at the end of the last step."""
+S, SLIP, WALLS, FRICTION, LEFT, STATUS, STORED = 0, 1, 3, 4, 5, 6, 9
+N_CONTACT = 10
+"""Memory of a contact: arc length, bristle (2), energy dissipated by walls and by friction, left the groove, regime
+at the last step's end and at its stages (2), elastic energy of the walls at its end."""
+EXCESS = 27
+"""Place in the law's results, free there: the bristle's force beyond the Coulomb limit, N."""
 FOOT_ITERATIONS = 2
-"""From the last iterate; each one shrinks the error by the cable's curvature times the wheel's distance, 1e-2 or less."""
+"""From the last iterate; each shrinks the error by the cable's curvature times the wheel's distance, 1e-2 or less."""
 MAX_ITERATIONS = 15
 SLOW = 0.2
 ERROR_FACTOR = 0.01
 """Local error of a step over h² times the change of the robot's accelerations against those predicted."""
 OK, NOT_CONVERGED, CONTACT_FAILED, OFF_CABLE = 0, 1, 2, 3
+NEWTON_STEP = 1e-3
+"""s; in shorter steps Newton's tolerance shrinks with the step, so that velocities, too, are found to a tolerance."""
 SAFETY, GROW, SHRINK = 0.8, 2.0, 0.2
 SHORTEST = 1e-7
 """s; a shorter step means that the equations cannot be solved."""
@@ -62,12 +66,13 @@ class System(NamedTuple):
 
 
 class State(NamedTuple):
-    """What changes: cable (its module's flat state), robot (21,), accelerations (2, 10), contacts (n_wheels, 8)."""
+    """What changes: cable (its module's flat state), robot (21,), accelerations (2, 10), contacts (n_wheels, 10)."""
 
     cable: np.ndarray
     robot: np.ndarray
     accelerations: np.ndarray
     contacts: np.ndarray
+    control_work: np.ndarray  # (1,) J
 
 
 class Space(NamedTuple):
@@ -102,6 +107,7 @@ class Space(NamedTuple):
     guess: np.ndarray  # (10,) accelerations of the robot predicted for the second stage
     elongation: np.ndarray  # (n_wheels, 2) of the bristles where the matrix is made
     arc: np.ndarray  # (2, n_wheels) arc lengths of the wheels' feet at the stages
+    saved: State  # at the start of a step
 
 
 def make_space(n: int, n_wheels: int) -> Space:
@@ -116,6 +122,7 @@ def make_space(n: int, n_wheels: int) -> Space:
         z((n_wheels, 8)), z(n_wheels, dtype=np.int64), z((N_ROBOT, n), dtype=c), z((n_wheels, N_ROBOT, 12), dtype=c),
         z((N_ROBOT, N_ROBOT), dtype=c), z(N_ROBOT, dtype=np.int64), z(N_ROBOT, dtype=c),
         z(N_ROBOT), z((n_wheels, 2)), z((2, n_wheels)),
+        State(z(state_size(n)), z(rb.RIGID), z((2, N_ROBOT)), z((n_wheels, N_CONTACT)), z(1)),
     )  # fmt: skip
 
 
@@ -204,6 +211,7 @@ def _loads(system, robot, points, slips, contacts, outs, generalized, space):
         rb.wheel_motion(system.robot, robot, k, motion[12:24])
         out = outs[k]
         law.friction(system.contacts[k], motion, slips[k], out)
+        out[EXCESS] = system.contacts[k, 9] * np.hypot(slips[k, 0], slips[k, 1]) - system.contacts[k, 3] * out[12]
         if contacts[k, LEFT] > 0.0:
             silence(out)
         g = motion[3:6]
@@ -232,8 +240,8 @@ def _cable_points(system, q, v, arcs, points, shape):
 def _follow(system, q, robot, arcs, space, shape):
     """Move every arc length in `arcs` (n_wheels,) to the foot of its wheel on the cable; return OK or OFF_CABLE.
 
-    The law takes the cable for a straight line. At the foot itself that costs nothing; at a distance x from it, it would be
-    wrong by curvature x²/2, which in every step would add that times the contact force to the energy.
+    The law takes the cable for a straight line. At the foot itself that costs nothing; at a distance x from it, it
+    would be wrong by curvature x²/2, which in every step would add that times the contact force to the energy.
     """
     motion, status = space.motion, OK
     for k in range(arcs.size):
@@ -533,6 +541,9 @@ def _accept(system, state, h, space, work):
     state.cable[4 * n + DISSIPATED] += h * (method.b[0] * work.power[0] + method.b[1] * work.power[1])
     state.cable[4 * n + LAST_INNER] = h
     r, b = state.robot, space.b
+    for j in range(2):
+        power = rb.control_power(system.robot, space.stage[j], system.control)
+        state.control_work[0] += h * method.b[j] * power
     rate = space.quaternions
     for j in range(2):
         _rotation_rate(space.theta[j], space.stage[j, 10:13], rate[j])
@@ -554,6 +565,18 @@ def _accept(system, state, h, space, work):
 
 
 @kernel
+def _regime(prm, out):
+    """Return the piece of the contact law at work: its status, and whether bristle and damper are at their limit.
+
+    Where it changes the friction has a kink. A step across one would be less accurate than its error estimate says.
+    """
+    limit = prm[3] * out[12]
+    if limit > 0.0 and out[13] ** 2 + out[14] ** 2 >= limit * limit * (1.0 - 1e-9):
+        return out[19] + 10.0
+    return out[19]
+
+
+@kernel
 def _accept_contacts(system, state, h, space, work):
     """Move the contacts' memory to the end of the step: bristle, energies, arc length; write the loads there."""
     method = system.method
@@ -563,6 +586,7 @@ def _accept_contacts(system, state, h, space, work):
         memory[FRICTION] += 0.5 * stiffness * (memory[SLIP] ** 2 + memory[SLIP + 1] ** 2)
         for j in range(2):
             out, weight = space.out[j, k], h * method.b[j]
+            memory[STATUS + 1 + j] = _regime(system.contacts[k], out)
             memory[WALLS] += weight * out[23]
             memory[FRICTION] -= weight * (out[13] * out[16] + out[14] * out[17])
             memory[SLIP] += weight * space.slip[j, k, 0]
@@ -586,10 +610,9 @@ def settle(system, state, move, space, work):
     if _walls(system, state.robot, space.cable_point, space.out[0], space) != OK:
         return CONTACT_FAILED
     _loads(system, state.robot, space.cable_point, space.trial, state.contacts, space.out[0], space.generalized, space)
-    for k in range(arcs.size):
-        state.contacts[k, STATUS] = space.out[0, k, 19]
     if move:
         for k in range(arcs.size):
+            state.contacts[k, STATUS] = _regime(system.contacts[k], space.out[0, k])
             _remember(state.contacts[k], space.out[0, k], arcs[k])
     return status
 
@@ -624,6 +647,7 @@ def step(system, state, h, tolerance, fresh, space, work, allowed, event):
     iterations : of Newton's method
     """
     n = system.model.weight.size
+    tolerance *= min(1.0, h / NEWTON_STEP)
     _predict(system, state, h, space, work)
     guess = space.guess
     for i in range(N_ROBOT):
@@ -667,13 +691,44 @@ def step(system, state, h, tolerance, fresh, space, work, allowed, event):
     error = 0.0
     for i in range(6):
         error = max(error, ERROR_FACTOR * h * h * abs(space.b[1, i] - guess[i]))
-    for k in range(system.contacts.shape[0]):
-        for j in range(2):
-            if h > event and space.out[j, k, 19] != state.contacts[k, STATUS]:
-                error = max(error, 1e4 * allowed)
     if error > allowed:
         return OK, error, iteration
-    return _accept(system, state, h, space, work), error, iteration
+    _copy(state, space.saved)
+    status = _accept(system, state, h, space, work)
+    if status == OK and h > event and _changed(state, space):
+        _copy(space.saved, state)
+        error = 1e4 * allowed
+    return status, error, iteration
+
+
+@kernel
+def _copy(source, target):
+    """Write one state over another."""
+    for i in range(source.cable.size):
+        target.cable[i] = source.cable[i]
+    for i in range(source.robot.size):
+        target.robot[i] = source.robot[i]
+    target.control_work[0] = source.control_work[0]
+    for i in range(N_ROBOT):
+        target.accelerations[0, i], target.accelerations[1, i] = source.accelerations[0, i], source.accelerations[1, i]
+    for k in range(source.contacts.shape[0]):
+        for i in range(N_CONTACT):
+            target.contacts[k, i] = source.contacts[k, i]
+
+
+@kernel
+def _changed(state, space):
+    """Return whether a contact's regime has changed in a step just made: at its end, at a stage, or in between.
+
+    The last shows in the bristle's excess over its limit, which grows as long as the contact slides.
+    """
+    for k in range(state.contacts.shape[0]):
+        for i in range(STATUS, STATUS + 3):
+            if state.contacts[k, i] != space.saved.contacts[k, STATUS]:
+                return True
+        if space.out[0, k, 19] == law.SLIP and space.out[0, k, EXCESS] < space.out[1, k, EXCESS]:
+            return True
+    return False
 
 
 @kernel
