@@ -282,8 +282,8 @@ def generalized_alpha_step(model, method, state, h, offset, ports, tolerance, fr
     """Advance the flat `state` by one inner step of generalized-alpha; parameters as in `collocation_step`.
 
     Chung & Hulbert 1993, eqs. (5)–(9), with all forces at the generalised midpoint t + (1 - alpha_f) h: the load of
-    a macro step is then never taken from its neighbour. The first row of accelerations is a, the second its value at the
-    midpoint. `start_alpha` and `end_alpha` enclose the inner steps of a macro step.
+    a macro step is then never taken from its neighbour. The first row of accelerations is a, the second its value
+    at the midpoint. `start_alpha` and `end_alpha` enclose the inner steps of a macro step.
     """
     n = model.weight.size
     q0, v0, a, sums = state[:n], state[n : 2 * n], state[2 * n : 4 * n].reshape(2, n), state[4 * n :]

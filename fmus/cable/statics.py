@@ -232,7 +232,7 @@ def _minimise(model: Model, q: np.ndarray, external: np.ndarray) -> tuple[bool, 
             continue
         fraction, energy, residual = found
         q = q + fraction * step
-        change = fraction * _largest(step)
+        change = _largest(step) if fraction == 1.0 else np.inf
         small = small + 1 if change < 100.0 * TOLERANCE * model.s[-1] and shift == 0.0 else 0
         if small >= 2 or (small and change < TOLERANCE * model.s[-1]):
             return True, q
@@ -247,14 +247,23 @@ def _line_search(
 
     None if none does.
     """
-    fraction = min(1.0, 0.1 * potential.model.s[-1] / max(_largest(step), 1e-300))
+    length = potential.model.s[-1]
+    if _largest(step) < 100.0 * TOLERANCE * length:  # the energy cannot tell such steps apart
+        return 1.0, *potential.evaluate(q + step)
+    fraction = min(1.0, 0.1 * length / max(_largest(step), 1e-300))
     slope = dot(residual, step)
     for _ in range(30):
         trial, there = potential.evaluate(q + fraction * step)
-        if trial <= energy + 1e-4 * fraction * slope + 1e-13 * (abs(trial) + abs(energy)):
+        round_off = 1e-13 * (abs(trial) + abs(energy))
+        if trial <= energy + 1e-4 * fraction * slope + round_off or (fraction == 1.0 and _halves(residual, there)):
             return fraction, trial, there
         fraction *= 0.5
     return None
+
+
+def _halves(residual: np.ndarray, there: np.ndarray) -> bool:
+    """Return whether the residual falls to half: near the minimum it says more than the energy, which is round-off."""
+    return bool(np.max(np.abs(there)) <= 0.5 * np.max(np.abs(residual)))
 
 
 def _largest(step: np.ndarray) -> float:
