@@ -209,6 +209,13 @@ def modes(
         print(f"table and picture in {path}")
 
 
+def _mode_cells(group: Any, k: int) -> tuple[str, str]:
+    """Return frequency and damping ratio of mode k (from 0) in words, or nothing."""
+    if k >= group.frequency.size:
+        return "", ""
+    return f"{group.frequency[k]:.6g}", f"{group.damping_ratio[k]:.3g}"
+
+
 @app.command()
 def report(
     directory: Annotated[Path, typer.Argument(metavar="DIR", help="Directory of a finished run.")],

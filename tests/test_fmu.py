@@ -14,7 +14,7 @@ from orchestrator.fmu import NOT_FINITE, TIMEOUT, Fmu, FmuError, suffixed, unzip
 from orchestrator.graph import Connection, Graph
 from orchestrator.masters import MASTERS
 from orchestrator.simulation import simulate
-from tests.fmus import build, build_fmi3, compiler, fmu
+from tests.fmus import build, compiled, compiler, fmu
 
 
 @pytest.fixture
@@ -226,7 +226,7 @@ needs_compiler = pytest.mark.skipif(compiler() is None, reason="no C compiler on
 @needs_compiler
 def test_fmi3_arrays_types_and_states():
     """u = (1, 2) mm held for 0.5 s from x = 1: x = 1 + 1.5, y = (x, 2 x); by hand."""
-    lag = Fmu(build_fmi3(), "lag")
+    lag = Fmu(compiled("lag3"), "lag")
     assert [lag.ports[n].unit for n in ("u[1]", "u[2]", "y[1]")] == ["mm", "mm", "m"]
     lag.set_parameters({"start": 1.0})
     started(lag)
@@ -250,7 +250,7 @@ def test_fmi3_and_fmi2_in_one_graph():
     order 2."""
     errors = []
     for H in (1e-4, 5e-5):
-        lags = {n: Fmu(build_fmi3(), n) for n in ("p", "q")}
+        lags = {n: Fmu(compiled("lag3"), n) for n in ("p", "q")}
         lags["p"].set_parameters({"start": 1e-3})
         pairs = [("p.y[1]", "q.u[1]"), ("q.y[1]", "p.u[2]"), ("p.y[1]", "c.u")]
         graph = Graph({**lags, "c": fmu("odd", "c", gain=1.0)}, [Connection(*pair) for pair in pairs])

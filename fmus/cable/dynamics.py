@@ -168,6 +168,7 @@ def _finished(change, rate, tolerance):
 
 @kernel
 def _same_key(key, q, v, h):
+    """Return whether the factors kept were made from this state and step."""
     n = q.size
     if key[2 * n] != h:
         return False

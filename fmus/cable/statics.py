@@ -226,7 +226,7 @@ def _minimise(model: Model, q: np.ndarray, external: np.ndarray) -> tuple[bool, 
             continue
         fraction, energy, residual = found
         q = q + fraction * step
-        change = _largest(step)
+        change = _largest(step) if fraction == 1.0 else np.inf
         small = small + 1 if change < 100.0 * TOLERANCE * model.s[-1] and shift == 0.0 else 0
         if small >= 2 or (small and change < TOLERANCE * model.s[-1]):
             return True, q
@@ -241,16 +241,23 @@ def _line_search(
 
     Near the solution the gain is lost in the round-off of the energy; there the residual has to fall.
     """
-    fraction = min(1.0, 0.1 * potential.model.s[-1] / max(_largest(step), 1e-300))
-    slope, size = dot(residual, step), np.abs(residual).max()
-    near = abs(slope) < 1e-8 * abs(energy)
+    length = potential.model.s[-1]
+    if _largest(step) < 100.0 * TOLERANCE * length:  # the energy cannot tell such steps apart
+        return 1.0, *potential.evaluate(q + step)
+    fraction = min(1.0, 0.1 * length / max(_largest(step), 1e-300))
+    slope = dot(residual, step)
     for _ in range(30):
         trial, there = potential.evaluate(q + fraction * step)
-        falls = trial <= energy + 1e-4 * fraction * slope + 1e-13 * (abs(trial) + abs(energy))
-        if falls or (near and np.abs(there).max() <= size):
+        round_off = 1e-13 * (abs(trial) + abs(energy))
+        if trial <= energy + 1e-4 * fraction * slope + round_off or (fraction == 1.0 and _halves(residual, there)):
             return fraction, trial, there
         fraction *= 0.5
     return None
+
+
+def _halves(residual: np.ndarray, there: np.ndarray) -> bool:
+    """Return whether the residual falls to half: near the minimum it says more than the energy, which is round-off."""
+    return bool(np.max(np.abs(there)) <= 0.5 * np.max(np.abs(residual)))
 
 
 def _largest(step: np.ndarray) -> float:
