@@ -93,9 +93,7 @@ class Recorder:
                 self.groups.append((fmu.group(names), places))
         missing = [s for s, owner in zip(self.signals, owners, strict=True) if owner not in graph.components]
         if missing:
-            raise ValueError(
-                f"cannot record {missing[0]}: no such component{nearest(missing[0], graph.components)}"
-            )
+            raise ValueError(f"cannot record {missing[0]}: no such component{nearest(missing[0], graph.components)}")
 
     def read(self, row: np.ndarray) -> None:
         """Read all signals into `row` (len(signals),)."""
@@ -259,9 +257,7 @@ def _watched(run: _Run, start: float, stop: float, timeout: float) -> None:
         while thread.is_alive():
             thread.join(min(timeout / 4, 0.25))
             hung = [
-                f
-                for f in run.graph.components.values()
-                if f.busy_since and perf_counter() - f.busy_since > timeout
+                f for f in run.graph.components.values() if f.busy_since and perf_counter() - f.busy_since > timeout
             ]
             if hung and thread.is_alive():
                 run.abandoned = True
