@@ -316,26 +316,20 @@ def _print_run(coupled: Coupled) -> None:
     )
     for line in _estimates(coupled):
         print(line)
+    if coupled.energy is not None:
+        print(f"energy drift: {coupled.energy.drift:.2g} J of {coupled.energy.exchanged:.3g} J exchanged")
 
 
 def _estimates(coupled: Coupled) -> Iterator[str]:
     """Yield a line for each signal with a tolerance: its estimated error beside what is allowed."""
     from orchestrator.compare import CONSTANT
 
-    for name, tolerance in coupled.scenario.simulation.tolerances.items():
-        if name not in coupled.estimated_error:
-            continue
-        error, scale = (
-            coupled.estimated_error[name],
-            max(float(coupled.table[name].max() - coupled.table[name].min()), CONSTANT),
-        )
-        share = error / scale
-        verdict = (
-            "within" if share <= tolerance else "not known: the coarser run failed" if share != share else "MISSED"
-        )
+    for name, error in coupled.estimated_error.items():
+        values, tolerance = coupled.table[name], coupled.scenario.simulation.tolerances[name]
+        share = error / max(float(values.max() - values.min()), CONSTANT)
+        missed = "MISSED" if share > tolerance else "not known, the coarser run failed"
+        verdict = "within" if share <= tolerance else missed
         yield f"estimated error of {name}: {error:.1e} ({share:.1e} of its range, allowed {tolerance:g}): {verdict}"
-    if coupled.energy is not None:
-        print(f"energy drift: {coupled.energy.drift:.2g} J of {coupled.energy.exchanged:.3g} J exchanged")
 
 
 def _print_comparison(comparison: Comparison) -> None:

@@ -1,8 +1,8 @@
 """The error of a coupled run, estimated without a reference: the run is repeated with everything coarser.
 
 Macro step and inner steps are doubled and the tolerances of the iteration raised, so that each of the errors grows; the
-largest difference between both runs over (2^p - 1) then estimates the error of the finer one (Richardson's rule). p is not
-measured by a third run: on the landings that predicts worse (docs/estimate.md).
+largest difference between both runs over (2^p - 1) then estimates the error of the finer one (Richardson's rule). p is
+not measured by a third run: on the landings that predicts worse (docs/estimate.md).
 """
 
 from __future__ import annotations
@@ -17,16 +17,16 @@ from orchestrator.results import Table
 from orchestrator.scenario import CableSection, Component, RobotSection, Scenario
 
 RAISED = {"tolerance": 10.0, "local_tolerance": 32.0}
-"""By this the master's tolerances are multiplied: the error of the iteration about as much as that of the step, and a local
-error of order 5 as by doubled sub-steps."""
+"""By this the master's tolerances are multiplied: the error of the iteration grows about as much as that of the step, a
+local error of order 5 as by doubled sub-steps."""
 INNER_STEP = "integration_step"
 
 
 def order(scenario: Scenario, exchange: str) -> int:
     """Return p.
 
-    `waveform` has order 4 where the motion is smooth and about 2 where touch, lift-off or slip falls inside a step: 3. Other
-    implicit coupling holds values at an instant: 2. Explicit coupling: 1, that is, the difference as it is.
+    `waveform` has order 4 where the motion is smooth and about 2 where touch, lift-off or slip falls inside a step: 3.
+    Other implicit coupling holds values at an instant: 2. Explicit coupling: 1, that is, the difference as it is.
     """
     if not MASTERS[scenario.simulation.master].IMPLICIT:
         return 1

@@ -54,8 +54,10 @@ NonNegative = Annotated[float, Field(ge=0.0)]
 
 
 class Simulation(Section):
-    """Times in s. `tolerances`: the largest `relative_max_error` that `compare` lets pass, by signal. `estimate`: whether `run`
-    estimates the error of those signals (docs/estimate.md)."""
+    """Times in s. `tolerances`: the largest `relative_max_error` that `compare` lets pass, by signal.
+
+    `estimate`: whether and how `run` estimates the error of those signals (docs/estimate.md).
+    """
 
     stop_time: Positive
     macro_step: Positive

@@ -5,8 +5,8 @@ F + Ḟ (tau - t - H/2), so that its work is F·Δx + Ḟ·(H/2 (x0 + x1) - H x�
 ``X.position_mean``; without it the second term is left out. The same with ``X.moment``, ``X.rotation``
 (integral of the angular velocity over the step, hence x0 = 0) and ``X.rotation_mean``.
 
-The component that gives the load books the same work with what it knows: the load it has computed in the step and the motion
-it was told. The difference is the energy that the coupling makes or loses; divided by the step it is the power residual of
+The component that gives the load books the same work with what it knows: the load it has computed in the step and the
+motion it was told. The difference is the energy that the coupling makes; divided by the step it is the power residual of
 Sadjina et al., Engineering with Computers 33 (2017) 607-620 (ECCO).
 """
 
@@ -33,7 +33,7 @@ class _Giver:
     Attributes
     ----------
     motion, mean : (m,) places in Graph.u where it is told motion and mean; `mean` may be empty
-    rates : (m,) places in Graph.u of the slopes that it gives; empty: its load is that of an instant, and straight in between
+    rates : (m,) places in Graph.u of the slopes that it gives; empty: its load is that of an instant, linear between
     """
 
     motion: np.ndarray
@@ -110,8 +110,8 @@ class Work:
     ----------
     names : the loads, ``cable.port[1].force``
     total : (len(names),) J, since `start`
-    residual : (len(names),) J, since `start`: `total` less what the giver of the load has booked; nan where it is not told the
-        motion
+    residual : (len(names),) J, since `start`: `total` less what the giver of the load has booked; nan where that one is
+        not told the motion
     """
 
     def __init__(self, graph: Graph):
