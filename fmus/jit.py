@@ -13,6 +13,7 @@ import os
 import tempfile
 from collections.abc import Callable
 from pathlib import Path
+from typing import Any
 
 import numba
 
@@ -48,9 +49,10 @@ numba.config.CACHE_DIR = str(_cache_folder())  # type: ignore[attr-defined]
 def kernel(function: Callable) -> Callable:
     """Compile a kernel; decorator.
 
-    Without Numba's run time (reference counts) nothing can be allocated: such code does not compile. A kernel whose name
-    begins with an underscore is called by kernels only, and gets no wrapper for Python. Both shorten compilation by
-    a fifth each.
+    Without Numba's run time (reference counts) nothing can be allocated: such code does not compile. A kernel whose
+    name begins with an underscore is called by kernels only, and gets no wrapper for Python. Both shorten compilation
+    by a fifth each.
     """
-    options = {"cache": True, "error_model": "numpy", "_nrt": False, "no_cfunc_wrapper": True}
-    return numba.njit(**options, no_cpython_wrapper=function.__name__.startswith("_"))(function)
+    inner = function.__name__.startswith("_")
+    options: dict[str, Any] = {"_nrt": False, "no_cfunc_wrapper": True, "no_cpython_wrapper": inner}
+    return numba.njit(cache=True, error_model="numpy", **options)(function)

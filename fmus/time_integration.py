@@ -8,12 +8,12 @@ and differ only in their coefficients. Newton's method needs one linear solve an
 M + h λ C + h² λ² K, λ being an eigenvalue of (a_ij): real for one stage, one of a complex pair for two.
 
 **Collocation** (two stages, `collocation`): the nodes are the roots of P2 - γ P1, P the Legendre polynomials on [0, 1].
-γ = 0 gives Gauss (order 4, spectral radius 1 at infinity, symplectic), γ = 1 gives Radau IIA (order 3, spectral radius 0);
-γ = (1 - ρ)/(1 + ρ) gives ρ in between, with an error of third order that is γ times that of Radau. A-stable for every ρ.
-Hairer & Wanner, Solving Ordinary Differential Equations II, sections IV.3 and IV.5.
+γ = 0 gives Gauss (order 4, spectral radius 1 at infinity, symplectic), γ = 1 gives Radau IIA (order 3, spectral
+radius 0); γ = (1 - ρ)/(1 + ρ) gives ρ in between, with an error of third order that is γ times that of Radau. A-stable
+for every ρ. Hairer & Wanner, Solving Ordinary Differential Equations II, sections IV.3 and IV.5.
 
-**Generalized-alpha** (`generalized_alpha`): order 2, spectral radius ρ at infinity; Chung & Hulbert 1993, with all forces
-at the generalised midpoint.
+**Generalized-alpha** (`generalized_alpha`): order 2, spectral radius ρ at infinity; Chung & Hulbert 1993, with all
+forces at the generalised midpoint.
 """
 
 from __future__ import annotations
@@ -32,7 +32,8 @@ class Collocation(NamedTuple):
     a, aa : (2, 2) a_ij and its square
     bb : (2,) b·a, the weights of the accelerations in the end position
     eigenvalue : () complex λ of a, the other one being its conjugate
-    to_mode, from_mode : (2,) complex, r ↦ to_mode·r and w ↦ 2 Re(from_mode w): the change to the eigenvector of λ and back
+    to_mode, from_mode : (2,) complex, r ↦ to_mode·r and w ↦ 2 Re(from_mode w): the change to the eigenvector of λ
+        and back
     extrapolate : (2, 2), stage accelerations of the next step of equal length on the line through those of this one
     end : (2,), acceleration at the end of the step on that line
     """
@@ -57,7 +58,7 @@ def collocation(spectral_radius: float) -> Collocation:
     a = np.stack([c, c**2 / 2], axis=1) @ np.linalg.inv(powers)
     b = np.array([1.0, 0.5]) @ np.linalg.inv(powers)
     values, vectors = np.linalg.eig(a)
-    k = int(np.argmax(values.imag))
+    k = int(np.argmax(np.imag(values)))
     order = [k, 1 - k]
     inverse = np.linalg.inv(vectors[:, order])
     line = np.linalg.inv(powers)

@@ -201,12 +201,19 @@ def modes(
     table = Table("mode", "out of plane \\[Hz]", "damping", "in plane \\[Hz]", "damping", box=None, pad_edge=False)
     groups = (found.out_of_plane, found.in_plane)
     for k in range(max(group.frequency.size for group in groups)):
-        cells = [(f"{g.frequency[k]:.6g}", f"{g.damping_ratio[k]:.3g}") if k < g.frequency.size else ("", "") for g in groups]
-        table.add_row(str(k + 1), *cells[0], *cells[1])
+        cells = [f"{x[k]:{form}}" if k < x.size else "" for g in groups for x, form in g.columns()]
+        table.add_row(str(k + 1), *cells)
     _print(table)
     if path is not None:
         vibration.write(found, path)
         print(f"table and picture in {path}")
+
+
+def _mode_cells(group: Any, k: int) -> tuple[str, str]:
+    """Return frequency and damping ratio of mode k (from 0) in words, or nothing."""
+    if k >= group.frequency.size:
+        return "", ""
+    return f"{group.frequency[k]:.6g}", f"{group.damping_ratio[k]:.3g}"
 
 
 @app.command()

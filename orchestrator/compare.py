@@ -14,8 +14,8 @@ from orchestrator.results import Table
 REFERENCE_MARGIN = 0.1
 """The reference's own error may be this part of a tolerance, or the verdict means nothing."""
 CONSTANT = 1e-6
-"""A signal whose reference moves by less than this (m, rad …) counts as constant: the verdict then takes this as its scale, as
-for the roll of a landing at midspan, which is zero by symmetry."""
+"""A signal whose reference moves by less than this (m, rad …) counts as constant: the verdict then takes this as its
+scale, as for the roll of a landing at midspan, which is zero by symmetry."""
 
 
 @dataclass(frozen=True)

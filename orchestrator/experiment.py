@@ -330,6 +330,7 @@ def summary(coupled: Coupled) -> dict[str, Any]:
         "left_the_groove": coupled.fallen,
         "energy": energy_content(coupled),
         "interface_work_J": {name: float(work[-1]) for name, work in log.energy.items()},
+        "interface_balance": landing.interface_balance(coupled.table, log.energy),
         "extremes": {n: _extremes(log.time, values) for n, values in coupled.table.items() if n != "time"},
     }
 

@@ -81,17 +81,21 @@ class Fmi2:
     def _instantiate(self) -> None:
         callbacks = fmi2CallbackFunctions()
         # FMPy's own logger goes through printf, which crashes on a stray '%'; messages are taken as they come
-        callbacks.logger = fmi2CallbackLoggerTYPE(
-            lambda _e, _n, status, _c, text: self.sink(status, _text(text))
-        )
+        callbacks.logger = fmi2CallbackLoggerTYPE(lambda _e, _n, status, _c, text: self.sink(status, _text(text)))
         callbacks.allocateMemory = fmi2CallbackAllocateMemoryTYPE(calloc)
         callbacks.freeMemory = fmi2CallbackFreeMemoryTYPE(free)
         self.slave.instantiate(callbacks=callbacks, loggingOn=True)
 
     def _raw(self, function: str, *arguments: Any) -> Callable[..., int]:
-        """Return a function of the library with its instance filled in."""
+        """Return a function of the library with its instance filled in; what is missing there answers with an error."""
+        if not hasattr(self.slave.dll, function):
+            return lambda *_: self._missing(function)
         prototype = CFUNCTYPE(c_int, c_void_p, *arguments)
         return partial(prototype((function, self.slave.dll)), self.component)
+
+    def _missing(self, function: str) -> int:
+        self.sink(ERROR, f"the library has no {function}")
+        return ERROR
 
     def accessor(self, verb: str, kind: str, vr: np.ndarray, values: np.ndarray) -> Call:
         """Return the call that gets or sets (`verb`) all of `vr` (n,) from or into `values` (m,); both are
@@ -102,9 +106,7 @@ class Fmi2:
         tail = () if len(sizes) == 1 else (values.size,)
         return partial(function, vr.ctypes.data, vr.size, values.ctypes.data, *tail)
 
-    def directional_derivative(
-        self, unknown: np.ndarray, known: np.ndarray, seed: np.ndarray, out: np.ndarray
-    ) -> int:
+    def directional_derivative(self, unknown: np.ndarray, known: np.ndarray, seed: np.ndarray, out: np.ndarray) -> int:
         """Write d(unknown)/d(known)·seed into `out`; value references are uint32."""
         if self.PREFIX == "fmi2":
             call = self._raw(self.DERIVATIVE, c_void_p, c_size_t, c_void_p, c_size_t, c_void_p, c_void_p)
@@ -189,16 +191,12 @@ class Fmi3(Fmi2):
         return FMU3Slave(**arguments)
 
     def _instantiate(self) -> None:
-        self.slave.instantiate(
-            logMessage=lambda _e, status, _c, text: self.sink(status, _text(text)), loggingOn=True
-        )
+        self.slave.instantiate(logMessage=lambda _e, status, _c, text: self.sink(status, _text(text)), loggingOn=True)
 
     def __init__(self, description: ModelDescription, folder: Path, name: str, sink: Sink):
         super().__init__(description, folder, name, sink)
         pointer = ctypes.c_void_p
-        self._do_step = self._raw(
-            "fmi3DoStep", c_double, c_double, c_bool, pointer, pointer, pointer, pointer
-        )
+        self._do_step = self._raw("fmi3DoStep", c_double, c_double, c_bool, pointer, pointer, pointer, pointer)
         self.flags = np.zeros(3, dtype=np.bool_)  # event handling needed, terminate, early return
         self.reached = np.zeros(1)
         base = self.flags.ctypes.data

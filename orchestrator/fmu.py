@@ -181,7 +181,7 @@ class Group:
     values : (n,) float64; integers and Booleans are cast
     """
 
-    __slots__ = ("fmu", "names", "ones", "runs", "values")
+    __slots__ = ("_get", "_set", "fmu", "names", "ones", "runs", "values")
 
     def __init__(self, fmu: Fmu, names: Sequence[str], values: np.ndarray | None = None):
         self.fmu, self.names = fmu, tuple(names)
@@ -192,34 +192,40 @@ class Group:
         ports = [fmu.port(name) for name in names]
         types = dict.fromkeys(p.fmi_type for p in ports)
         picks = {
-            kind: np.array([i for i, p in enumerate(ports) if p.fmi_type == kind], dtype=np.intp)
-            for kind in types
+            kind: np.array([i for i, p in enumerate(ports) if p.fmi_type == kind], dtype=np.intp) for kind in types
         }
         if "String" in types:
-            raise ValueError(
-                f"{fmu.name}: {ports[picks['String'][0]].name} is a string and has no place among numbers"
-            )
-        self.runs = [
-            _Run(fmu, kind, [ports[i] for i in pick], pick, self.values) for kind, pick in picks.items()
-        ]
+            raise ValueError(f"{fmu.name}: {ports[picks['String'][0]].name} is a string and has no place among numbers")
+        self.runs = [_Run(fmu, kind, [ports[i] for i in pick], pick, self.values) for kind, pick in picks.items()]
+
+        # one direct run is the common case: its call is used as it is
+        direct = len(self.runs) == 1 and self.runs[0].direct
+        self._get: Call = self.runs[0].get_call if direct else self._get_runs
+        self._set: Call = self.runs[0].set_call if direct else self._set_runs
+
+    def _get_runs(self) -> int:
+        return max((run.get() for run in self.runs), default=0)
+
+    def _set_runs(self) -> int:
+        return max((run.set() for run in self.runs), default=0)
 
     def get(self) -> None:
         """Read all from the FMU into `values`."""
-        for run in self.runs:
-            status = run.get()
-            if status > WARNING:
-                raise self.fmu.error(status, f"reading {self.names[0]} … {self.names[-1]}")
+        status = self._get()
+        if status > WARNING:
+            raise self.fmu.error(status, f"reading {self.names[0]} … {self.names[-1]}")
 
     def set(self) -> None:
         """Write all of `values` to the FMU."""
-        for run in self.runs:
-            status = run.set()
-            if status > WARNING:
-                raise self.fmu.error(status, f"writing {self.names[0]} … {self.names[-1]}")
+        status = self._set()
+        if status > WARNING:
+            raise self.fmu.error(status, f"writing {self.names[0]} … {self.names[-1]}")
 
     def get_finite(self) -> None:
         """Read all; raise `FmuError` if a value is not finite."""
-        self.get()
+        status = self._get()
+        if status > WARNING:
+            raise self.fmu.error(status, f"reading {self.names[0]} … {self.names[-1]}")
         total = self.values.dot(self.ones)
         if not -np.inf < total < np.inf:
             self._name_not_finite()
@@ -228,9 +234,7 @@ class Group:
         bad = [name for name, value in zip(self.names, self.values, strict=True) if not np.isfinite(value)]
         if bad:
             more = f" and {len(bad) - 1} more" if len(bad) > 1 else ""
-            raise FmuError(
-                self.fmu.name, self.fmu.time, NOT_FINITE, f"output {bad[0]}{more} is not a finite number"
-            )
+            raise FmuError(self.fmu.name, self.fmu.time, NOT_FINITE, f"output {bad[0]}{more} is not a finite number")
 
 
 class Fmu:
@@ -398,9 +402,7 @@ def _read(path: Path) -> tuple[ModelDescription, str]:
     if description.coSimulation is None:
         raise ValueError(f"{path}: no co-simulation FMU; export it for co-simulation")
     if str(description.fmiVersion).startswith("1"):
-        raise ValueError(
-            f"{path}: FMI {description.fmiVersion} is not supported; export it for FMI 2.0 or 3.0"
-        )
+        raise ValueError(f"{path}: FMI {description.fmiVersion} is not supported; export it for FMI 2.0 or 3.0")
     return description, sha256
 
 
@@ -411,8 +413,7 @@ def _capabilities(description: ModelDescription) -> Capabilities:
         serialize=bool(interface.canSerializeFMUstate),
         variable_step=bool(interface.canHandleVariableCommunicationStepSize),
         directional_derivatives=bool(interface.providesDirectionalDerivative),
-        input_derivatives=bool(interface.canInterpolateInputs)
-        and str(description.fmiVersion).startswith("2"),
+        input_derivatives=bool(interface.canInterpolateInputs) and str(description.fmiVersion).startswith("2"),
     )
 
 

@@ -7,8 +7,9 @@ iteration of a macro step.
 
 from __future__ import annotations
 
-from collections.abc import Callable, Iterable, Mapping, Sequence
+from collections.abc import Iterable, Mapping, Sequence
 from dataclasses import dataclass, field
+from typing import Any, Protocol
 
 import numpy as np
 from fmpy.model_description import Unit
@@ -34,6 +35,19 @@ class Connection:
     target: str
 
 
+class Observer(Protocol):
+    """Is told of every accepted step, and can go back when the step is rolled back after all."""
+
+    def __call__(self, t: float, h: float) -> None:
+        """All components went from `t` to `t + h`; the inputs of that step are still in `Graph.u`."""
+
+    def save(self) -> Any:
+        """Return what `restore` needs."""
+
+    def restore(self, saved: Any) -> None:
+        """Go back to what was saved."""
+
+
 @dataclass
 class Node:
     """One component and its place in the arrays of the graph.
@@ -44,6 +58,7 @@ class Node:
     outputs : outputs that feed continuous connections; a slice of `Graph.y`
     discrete_inputs, discrete_outputs : the same for discrete connections; slices of `Graph.d`, `Graph.e`
     rates : inputs ``_rate`` of its loads that nothing feeds; a slice of `Graph.r`
+    acted : its slice of `Graph.acted`
     forward : (m,) int, where in `Graph.y` the inputs after the torn ones come from
     forward_values : (m,) view of `Graph.u`
     feedthrough : whether one of the outputs depends on one of the inputs without a step
@@ -56,6 +71,7 @@ class Node:
     discrete_inputs: Group
     discrete_outputs: Group
     rates: Group
+    acted: np.ndarray
     first: int
     torn: int
     forward: np.ndarray
@@ -66,7 +82,7 @@ class Node:
 
     def receive(self, y: np.ndarray) -> None:
         """Take the inputs that are not torn from the outputs `y`."""
-        np.take(y, self.forward, out=self.forward_values, mode="clip")
+        y.take(self.forward, out=self.forward_values, mode="clip")
         if self.gain is not None and self.offset is not None:
             np.multiply(self.forward_values, self.gain, out=self.forward_values)
             np.add(self.forward_values, self.offset, out=self.forward_values)
@@ -97,21 +113,22 @@ class Graph:
     Attributes
     ----------
     u : (n_u,) continuous inputs of all components, in their units
+    acted : (n_u,) what acted in the last step: a master that interpolates takes `u` to the end of the step afterwards
     y : (n_y,) continuous outputs
-    r : (n_r,) rates of loads that no connection feeds, for the master to set; `rate_of` (n_r,) are the
-        loads' places in u
+    r : (n_r,) rates of loads that no connection feeds (`free_rates`), for the master to set; `rate_of` (n_r,) are
+        the loads' places in u
     source, gain, offset : (n_u,) u = gain * y[source] + offset; `gain` is None when all are 1 and 0
     torn : (n_t,) places in `u` that are fed by a component later in the order (or itself): the unknowns of
         implicit masters
     nodes : the components in Gauss–Seidel order
-    observers : called as f(t, h) after every accepted step of all components, inputs of that step still in
-        `u`
+    feedthrough : component → output → the inputs it depends on without a step, None where the FMU does not say
+    observers : are told of every accepted step
     """
 
     components: Mapping[str, Fmu]
     connections: Iterable[Connection]
     order: Sequence[str] | None = None
-    observers: list[Callable[[float, float], None]] = field(default_factory=list)
+    observers: list[Observer] = field(default_factory=list)
 
     def __post_init__(self) -> None:
         self.components = dict(self.components)
@@ -121,17 +138,21 @@ class Graph:
                 raise GraphError(f"component {name!r}: names are not empty and have no dot; rename it")
             fmu.name = name
         self._links = _checked_links(self.components, self.connections)
-        feedthrough = _dependencies(self.components, initial=False)
+        self.feedthrough = feedthrough = _dependencies(self.components, initial=False)
         derived = self.order is None
-        self.order = (
-            _derived_order(self.components, self._links, feedthrough) if derived else self._given_order()
-        )
+        self.order = _derived_order(self.components, self._links, feedthrough) if derived else self._given_order()
         self._allocate()
         self.nodes = [self._node(name) for name in self.order]
         self.discrete = [n for n in self.nodes if n.discrete_inputs.names or n.discrete_outputs.names]
         self.stages, _ = self._stages(feedthrough)
-        for node in {node.name: node for stage in self.stages[1:] for node in stage}.values():
-            node.feedthrough = True
+        read_late = {node.name for stage in self.stages[1:] for node in stage}
+        for node in self.nodes:
+            node.feedthrough = any(
+                deps is None or deps & {node.fmu.ports[name].variable for name in node.inputs.names}
+                for deps in feedthrough[node.name].values()
+            )
+        # outputs that feed nothing may depend on inputs too, and are recorded
+        self.leaves = [node for node in self.nodes if node.feedthrough and node.name not in read_late]
         self.initial_stages, self._loop = self._stages(_dependencies(self.components, initial=True))
 
     def _given_order(self) -> tuple[str, ...]:
@@ -153,16 +174,15 @@ class Graph:
         self._outputs = sorted(dict.fromkeys(k.source for k in continuous), key=lambda s: rank[s[0]])
         self._discrete_outputs = sorted(dict.fromkeys(k.source for k in discrete), key=lambda s: rank[s[0]])
         self.u, self.y = np.zeros(len(continuous)), np.zeros(len(self._outputs))
+        self.acted = self.u.copy()
         self.d, self.e = np.zeros(len(discrete)), np.zeros(len(self._discrete_outputs))
         self.source, self.gain, self.offset = _gather(continuous, self._outputs)
-        self.discrete_source, self.discrete_gain, self.discrete_offset = _gather(
-            discrete, self._discrete_outputs
-        )
+        self.discrete_source, self.discrete_gain, self.discrete_offset = _gather(discrete, self._discrete_outputs)
         torn = [i for i, k in enumerate(continuous) if rank[k.source[0]] >= rank[k.target[0]]]
         self.torn = np.array(torn, dtype=np.intp)
         self.input_names = [".".join(target) for target in self._inputs]
-        self._rates, self.rate_of = self._free_rates()
-        self.r = np.zeros(len(self._rates))
+        self.free_rates, self.rate_of = self._free_rates()
+        self.r = np.zeros(len(self.free_rates))
 
     def _free_rates(self) -> tuple[list[tuple[str, str]], np.ndarray]:
         """Return the inputs ``_rate`` of connected loads that nothing feeds, and the places of those loads
@@ -171,11 +191,7 @@ class Graph:
         rates, places = [], []
         for i, (component, name) in enumerate(self._inputs):
             ports, rate = self.components[component].ports, (component, suffixed(name, "_rate"))
-            known = (
-                rate[1] in ports
-                and ports[rate[1]].causality == "input"
-                and suffixed(name, "_mean") not in ports
-            )
+            known = rate[1] in ports and ports[rate[1]].causality == "input" and suffixed(name, "_mean") not in ports
             if known and rate not in fed:
                 rates.append(rate)
                 places.append(i)
@@ -200,7 +216,8 @@ class Graph:
             group(self._outputs, self.y),
             group(self._discrete_inputs, self.d),
             group(self._discrete_outputs, self.e),
-            group(self._rates, self.r),
+            group(self.free_rates, self.r),
+            self.acted[first : first + len(inputs.names)],
             first,
             torn,
             self.source[forward],
@@ -211,7 +228,7 @@ class Graph:
 
     def gather(self) -> None:
         """Move all continuous outputs to the inputs: u from y."""
-        np.take(self.y, self.source, out=self.u, mode="clip")
+        self.y.take(self.source, out=self.u, mode="clip")
         if self.gain is not None and self.offset is not None:
             np.multiply(self.u, self.gain, out=self.u)
             np.add(self.u, self.offset, out=self.u)
@@ -219,11 +236,7 @@ class Graph:
     def gathered(self, places: np.ndarray) -> np.ndarray:
         """Return what the outputs say about the inputs at `places` of u: (len(places),)."""
         values = self.y[self.source[places]]
-        return (
-            values
-            if self.gain is None or self.offset is None
-            else values * self.gain[places] + self.offset[places]
-        )
+        return values if self.gain is None or self.offset is None else values * self.gain[places] + self.offset[places]
 
     def exchange_discrete(self) -> None:
         """Move the discrete connections (at a communication point)."""
@@ -231,7 +244,7 @@ class Graph:
             return
         for node in self.discrete:
             node.discrete_outputs.get_finite()
-        np.take(self.e, self.discrete_source, out=self.d, mode="clip")
+        self.e.take(self.discrete_source, out=self.d, mode="clip")
         if self.discrete_gain is not None and self.discrete_offset is not None:
             self.d[:] = self.d * self.discrete_gain + self.discrete_offset
         for node in self.discrete:
@@ -257,6 +270,8 @@ class Graph:
                     node.inputs.set()
                 node.outputs.get_finite()
         self.gather()
+        for node in self.leaves:
+            node.inputs.set()
 
     def initialize(self, start: float, stop: float | None = None) -> None:
         """Initialise all FMUs consistently: values go along the connections, algebraic loops are solved."""
@@ -376,9 +391,7 @@ def _checked(components: Mapping[str, Fmu], connection: Connection) -> _Link:
     )
     a, b = components[source[0]].ports[source[1]], components[target[0]].ports[target[1]]
     if a.causality != "output":
-        raise GraphError(
-            f"{where}: {connection.source} is no output but {a.causality}; connect from an output"
-        )
+        raise GraphError(f"{where}: {connection.source} is no output but {a.causality}; connect from an output")
     if b.causality != "input":
         raise GraphError(f"{where}: {connection.target} is no input but {b.causality}; connect to an input")
     if (a.kind, b.kind) not in CASTS:
@@ -460,9 +473,7 @@ def _components_of(edges: Iterable[tuple[int, int]], n: int) -> np.ndarray:
     pairs = np.array(sorted(set(edges)), dtype=np.intp).reshape(-1, 2)
     matrix = csr_array((np.ones(len(pairs)), (pairs[:, 0], pairs[:, 1])), shape=(n, n))
     _, labels = connected_components(matrix, directed=True, connection="strong")
-    ranks = _longest_paths(
-        [(labels[a], labels[b]) for a, b in pairs if labels[a] != labels[b]], int(labels.max()) + 1
-    )
+    ranks = _longest_paths([(labels[a], labels[b]) for a, b in pairs if labels[a] != labels[b]], int(labels.max()) + 1)
     return np.array([ranks[label] * (n + 1) + label for label in labels])
 
 
@@ -478,17 +489,12 @@ def _longest_paths(edges: Sequence[tuple[int, int]], n: int) -> list[int]:
     return rank
 
 
-def _derived_order(
-    components: Mapping[str, Fmu], links: list[_Link], feedthrough: Dependencies
-) -> tuple[str, ...]:
+def _derived_order(components: Mapping[str, Fmu], links: list[_Link], feedthrough: Dependencies) -> tuple[str, ...]:
     """Return an order along the connections; inside a loop along the feedthrough, else as the components
     were named."""
     names = list(components)
     index = {name: i for i, name in enumerate(names)}
-    through = {
-        name: frozenset().union(*(deps or () for deps in table.values()))
-        for name, table in feedthrough.items()
-    }
+    through = {name: frozenset().union(*(deps or () for deps in table.values())) for name, table in feedthrough.items()}
     continuous = [k for k in links if not k.discrete and k.source[0] != k.target[0]]
     edges = [(index[k.source[0]], index[k.target[0]]) for k in continuous]
     variables = [components[k.target[0]].ports[k.target[1]].variable for k in continuous]

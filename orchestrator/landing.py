@@ -167,7 +167,7 @@ def graph(scenario: Scenario, exchange: str) -> Graph:
             contact = Fmu(scenario.contact.fmu or library.contact_fmu(), f"contact{k}")
             components[f"contact{k}"] = contact
             contact.set_parameters(resolved.contact | {"initial.s": s, "exchange": exchange})
-        return Graph(components, _connections(components), order=tuple(components))
+        return Graph(components, _connections(components, exchange), order=tuple(components))
     except BaseException:
         for fmu in components.values():
             fmu.close()
@@ -179,8 +179,11 @@ def _gives_means(components: Mapping[str, Fmu]) -> bool:
     return "port[1].position_mean.x" in cable and "wheel[1].rotation_mean.x" in robot
 
 
-def _connections(components: Mapping[str, Fmu]) -> list[Connection]:
-    """Return all connections of the contract for which both sides have the variable."""
+def _connections(components: Mapping[str, Fmu], exchange: str) -> list[Connection]:
+    """Return all connections of the contract for which both sides have the variable.
+
+    `point` gives no slopes: left open, the masters set them by joining or extrapolating the forces of the ends.
+    """
     found: list[Connection] = []
     for name in components:
         if not name.startswith("contact"):
@@ -188,7 +191,7 @@ def _connections(components: Mapping[str, Fmu]) -> list[Connection]:
         k = name.removeprefix("contact")
         for side, partner in (("cable", f"cable.port[{k}]"), ("wheel", f"robot.wheel[{k}]")):
             found += _links(components, f"{name}.{side}", partner)
-    return found
+    return [c for c in found if exchange != "point" or "_rate." not in c.source]
 
 
 def _links(components: Mapping[str, Fmu], contact: str, partner: str) -> Iterator[Connection]:
@@ -229,3 +232,39 @@ def cable_fields(scenario: Scenario, table: Mapping[str, np.ndarray]) -> dict[st
         "position": position,
         "tension": tension,
     }
+
+
+def interface_balance(table: Mapping[str, np.ndarray], booked: Mapping[str, np.ndarray]) -> dict[str, dict[str, float]]:
+    """Return for every contact how well the energies on both sides of its two interfaces agree.
+
+    Parameters
+    ----------
+    table : signals over time
+    booked : load (``robot.wheel[1].force``) → work done through it over time, J; serves where an FMU books none itself
+
+    Returns
+    -------
+    contact → `exchanged_J`, the energy that went to and fro on cable and wheel; `cable_residual_J`,
+    `wheel_residual_J`, the largest difference between the work that component and contact have booked;
+    `law_residual_J`, the largest difference between the contact's work and what it stores and dissipates;
+    `relative`, the largest of the three by the energy exchanged
+    """
+    contacts = sorted(name.removesuffix(".work_cable") for name in table if name.endswith(".work_cable"))
+    return {contact: _balance(table, booked, contact) for contact in contacts}
+
+
+def _balance(table: Mapping[str, np.ndarray], booked: Mapping[str, np.ndarray], contact: str) -> dict[str, float]:
+    k = contact.removeprefix("contact")
+    work = {side: table[f"{contact}.work_{side}"] for side in ("cable", "wheel")}
+    residuals = {}
+    for side, port in (("cable", f"cable.port[{k}]"), ("wheel", f"robot.wheel[{k}]")):
+        theirs = table.get(f"{port}.work")
+        if theirs is None:
+            theirs = sum((values for name, values in booked.items() if name.startswith(f"{port}.")), np.zeros(1))
+        residuals[f"{side}_residual_J"] = float(np.max(np.abs(theirs - work[side])))
+    kept = table[f"{contact}.strain_energy"] + table[f"{contact}.dissipated_energy"]
+    law = work["cable"] + work["wheel"] + kept
+    residuals["law_residual_J"] = float(np.max(np.abs(law - law[0])))
+    exchanged = float(sum(np.sum(np.abs(np.diff(values))) for values in work.values()))
+    largest = max(residuals.values())
+    return {"exchanged_J": exchanged, **residuals, "relative": largest / exchanged if exchanged else largest}

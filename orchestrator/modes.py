@@ -41,6 +41,10 @@ class Modes:
     damping_ratio: np.ndarray
     shape: np.ndarray
 
+    def columns(self) -> tuple[tuple[np.ndarray, str], ...]:
+        """Return what a table shows of the modes, with formats."""
+        return (self.frequency, ".6g"), (self.damping_ratio, ".3g")
+
 
 @dataclass(frozen=True)
 class CableModes:
@@ -151,7 +155,7 @@ def write(found: CableModes, directory: Path) -> None:
 
 
 def draw(found: CableModes, path: Path) -> None:
-    """Draw the shapes over the span: displacement across the plane on the left, vertical and along the span on the right."""
+    """Draw the shapes over the span: across the plane on the left, vertical and along the span on the right."""
     import matplotlib.pyplot as plt
 
     from orchestrator.plots import BLUE, STYLE, VERMILION

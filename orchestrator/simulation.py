@@ -9,7 +9,7 @@ from time import perf_counter
 
 import numpy as np
 
-from orchestrator.fmu import TIMEOUT, FmuError, nearest
+from orchestrator.fmu import TIMEOUT, FmuError, Group, nearest
 from orchestrator.graph import Graph
 from orchestrator.masters.base import Master, StepReport
 from orchestrator.work import Work
@@ -72,22 +72,28 @@ class Recorder:
     def __init__(self, graph: Graph, record: Sequence[str] | None):
         self.signals = _all_outputs(graph) if record is None else list(record)
         owners = [signal.partition(".")[0] for signal in self.signals]
-        self.parts = []
+        self.row = np.zeros(len(self.signals))
+        self.groups: list[tuple[Group, np.ndarray | None]] = []
         for component, fmu in graph.components.items():
             places = np.array([i for i, owner in enumerate(owners) if owner == component], dtype=np.intp)
-            if places.size:
-                self.parts.append((fmu.group([self.signals[i].partition(".")[2] for i in places]), places))
+            if not places.size:
+                continue
+            names = [self.signals[i].partition(".")[2] for i in places]
+            if places[-1] - places[0] + 1 == places.size:  # neighbours: the FMU writes them where they belong
+                self.groups.append((fmu.group(names, self.row[places[0] : places[-1] + 1]), None))
+            else:
+                self.groups.append((fmu.group(names), places))
         missing = [s for s, owner in zip(self.signals, owners, strict=True) if owner not in graph.components]
         if missing:
-            raise ValueError(
-                f"cannot record {missing[0]}: no such component{nearest(missing[0], graph.components)}"
-            )
+            raise ValueError(f"cannot record {missing[0]}: no such component{nearest(missing[0], graph.components)}")
 
     def read(self, row: np.ndarray) -> None:
         """Read all signals into `row` (len(signals),)."""
-        for group, places in self.parts:
+        for group, places in self.groups:
             group.get_finite()
-            row[places] = group.values
+            if places is not None:
+                self.row[places] = group.values
+        row[:] = self.row
 
 
 def _all_outputs(graph: Graph) -> list[str]:
@@ -232,9 +238,7 @@ def _watched(run: _Run, start: float, stop: float, timeout: float) -> None:
         while thread.is_alive():
             thread.join(min(timeout / 4, 0.25))
             hung = [
-                f
-                for f in run.graph.components.values()
-                if f.busy_since and perf_counter() - f.busy_since > timeout
+                f for f in run.graph.components.values() if f.busy_since and perf_counter() - f.busy_since > timeout
             ]
             if hung and thread.is_alive():
                 run.abandoned = True

@@ -27,20 +27,22 @@ class _Interface:
 
     name: str
     loads: np.ndarray  # (m,) places in Graph.u
-    rates: np.ndarray  # (m,) places in Graph.u, or empty
+    rates: np.ndarray  # (m,) places in Graph.u, in Graph.r where the master sets them, or empty
+    own: bool  # whether the master sets the rates
     motion: Group
     mean: Group | None
     relative: bool
     before: np.ndarray  # (m,)
 
-    def work(self, u: np.ndarray, H: float) -> float:
+    def work(self, graph: Graph, H: float) -> float:
         """Return the work of the step that has just been made, J."""
         self.motion.get()
+        u, slopes = graph.acted, graph.r if self.own else graph.acted
         x1, x0 = self.motion.values, self.before
-        total = float(u[self.loads] @ (x1 - x0))
+        total = u.take(self.loads).dot(x1 - x0)
         if self.mean is not None and self.rates.size:
             self.mean.get()
-            total += float(u[self.rates] @ (H / 2 * (x0 + x1) - H * self.mean.values))
+            total += slopes.take(self.rates).dot(H / 2 * (x0 + x1) - H * self.mean.values)
         if self.relative:
             self.before = x1.copy()
         return total
@@ -66,14 +68,22 @@ class Work:
         self.total[:] = 0.0
         for interface in self.interfaces:
             interface.motion.get()
-            interface.before = (
-                interface.motion.values.copy() if interface.relative else np.zeros(interface.loads.size)
-            )
+            interface.before = interface.motion.values.copy() if interface.relative else np.zeros(interface.loads.size)
 
-    def __call__(self, t: float, H: float) -> None:
-        """Book the step from `t` to `t + H`."""
+    def save(self) -> tuple[np.ndarray, list[np.ndarray]]:
+        """Return what `restore` needs."""
+        return self.total.copy(), [interface.before for interface in self.interfaces]
+
+    def restore(self, saved: tuple[np.ndarray, list[np.ndarray]]) -> None:
+        """Go back: the steps booked since are not made."""
+        self.total[:] = saved[0]
+        for interface, before in zip(self.interfaces, saved[1], strict=True):
+            interface.before = before
+
+    def __call__(self, t: float, h: float) -> None:
+        """Book the step from `t` to `t + h`."""
         for i, interface in enumerate(self.interfaces):
-            self.total[i] += interface.work(self.graph.u, H)
+            self.total[i] += interface.work(self.graph, h)
 
 
 def _interfaces(graph: Graph, node: Node) -> list[_Interface]:
@@ -83,23 +93,29 @@ def _interfaces(graph: Graph, node: Node) -> list[_Interface]:
         stem = name[:-2] if name[-2:] in (".x", ".y", ".z") else name
         if stem.rpartition(".")[2] in PAIRS:
             found.setdefault(stem, []).append(name)
-    interfaces = [_interface(node, stem, names, place) for stem, names in found.items()]
+    own = {name: i for i, (part, name) in enumerate(graph.free_rates) if part == node.name}
+    interfaces = [_interface(node, stem, names, place, own) for stem, names in found.items()]
     return [interface for interface in interfaces if interface is not None]
 
 
-def _interface(node: Node, stem: str, names: list[str], place: dict[str, int]) -> _Interface | None:
+def _interface(
+    node: Node, stem: str, names: list[str], place: dict[str, int], own: dict[str, int]
+) -> _Interface | None:
     load = stem.rpartition(".")[2]
     motion, relative = PAIRS[load]
     motions = [stem[: -len(load)] + motion + name[len(stem) :] for name in names]
     means = [suffixed(name, "_mean") for name in motions]
     rates = [suffixed(name, "_rate") for name in names]
+    by_master = all(name in own for name in rates)
+    where = own if by_master else place
     ports = node.fmu.ports
     if not all(name in ports and ports[name].causality == "output" for name in motions):
         return None
     return _Interface(
         f"{node.name}.{stem}",
         np.array([place[name] for name in names], dtype=np.intp),
-        np.array([place[name] for name in rates if name in place], dtype=np.intp),
+        np.array([where[name] for name in rates if name in where], dtype=np.intp),
+        by_master,
         node.fmu.group(motions),
         node.fmu.group(means) if all(name in ports for name in means) else None,
         relative,

@@ -11,10 +11,10 @@ import numpy as np
 import pytest
 
 from orchestrator.fmu import NOT_FINITE, TIMEOUT, Fmu, FmuError, suffixed, unzip_folder
-from orchestrator.graph import Graph
+from orchestrator.graph import Connection, Graph
 from orchestrator.masters import MASTERS
 from orchestrator.simulation import simulate
-from tests.fmus import build, fmu
+from tests.fmus import build, compiled, compiler, fmu
 
 
 @pytest.fixture
@@ -218,3 +218,45 @@ def test_process_ends_cleanly():
 def test_suffix_goes_before_the_axis():
     assert suffixed("port[1].force.x", "_rate") == "port[1].force_rate.x"
     assert suffixed("force", "_mean") == "force_mean"
+
+
+needs_compiler = pytest.mark.skipif(compiler() is None, reason="no C compiler on this machine")
+
+
+@needs_compiler
+def test_fmi3_arrays_types_and_states():
+    """u = (1, 2) mm held for 0.5 s from x = 1: x = 1 + 1.5, y = (x, 2 x); by hand."""
+    lag = Fmu(compiled("lag3"), "lag")
+    assert [lag.ports[n].unit for n in ("u[1]", "u[2]", "y[1]")] == ["mm", "mm", "m"]
+    lag.set_parameters({"start": 1.0})
+    started(lag)
+    inputs, outputs = lag.group(["u[1]", "u[2]"]), lag.group(["y[2]", "count", "flag", "y[1]"])
+    inputs.values[:] = 1.0, 2.0
+    inputs.set()
+    state = lag.save()
+    for _ in range(2):
+        lag.step(0.0, 0.5)
+        outputs.get()
+        assert outputs.values.tolist() == [5.0, 1.0, 1.0, 2.5]
+        lag.restore(state)
+    lag.release(state)
+    assert lag.log == ["[ok] made for 100% of the tests"]
+    lag.close()
+
+
+@needs_compiler
+def test_fmi3_and_fmi2_in_one_graph():
+    """Two FMI 3.0 lags in a loop, metres into millimetres: p' = 1000 q, q' = 1000 p, so p = cosh(1000 t) mm;
+    order 2."""
+    errors = []
+    for H in (1e-4, 5e-5):
+        lags = {n: Fmu(compiled("lag3"), n) for n in ("p", "q")}
+        lags["p"].set_parameters({"start": 1e-3})
+        pairs = [("p.y[1]", "q.u[1]"), ("q.y[1]", "p.u[2]"), ("p.y[1]", "c.u")]
+        graph = Graph({**lags, "c": fmu("odd", "c", gain=1.0)}, [Connection(*pair) for pair in pairs])
+        log = simulate(graph, MASTERS["iqn_ils"](graph), 0.0, 2e-3, H, ["p.y[1]", "c.y"])
+        graph.close()
+        assert log.error is None
+        assert log.signal("c.y") == pytest.approx(1e3 * log.signal("p.y[1]"), rel=1e-12)
+        errors.append(np.max(np.abs(log.signal("p.y[1]") - 1e-3 * np.cosh(1e3 * log.time))))
+    assert np.log2(errors[0] / errors[1]) == pytest.approx(2.0, abs=0.2)

@@ -3,7 +3,7 @@
 from __future__ import annotations
 
 import numpy as np
-from scipy.optimize import brentq
+from scipy.optimize import root_scalar
 
 from fmus.cable import dynamics
 from fmus.cable.assembly import Model, interpolate
@@ -77,8 +77,10 @@ def _port(k: int) -> tuple[list[Variable], list[Variable]]:
     outputs += vector(f"{p}.tangent", "output", "1", "dr/ds there, not normalised", feedthrough=f)
     outputs += vector(f"{p}.velocity", "output", "m/s", "velocity of the contact point", feedthrough=f)
     outputs += vector(f"{p}.tangent_rate", "output", "1/s", "rate of dr/ds", feedthrough=f)
-    outputs += vector(f"{p}.position_mean", "output", "m", "time mean of position over the last macro step")
-    outputs += vector(f"{p}.tangent_mean", "output", "1", "time mean of tangent over the last macro step")
+    # before the first step the means are the values, hence their dependence on s
+    over = "over the last macro step"
+    outputs += vector(f"{p}.position_mean", "output", "m", f"time mean of position {over}", feedthrough=f)
+    outputs += vector(f"{p}.tangent_mean", "output", "1", f"time mean of tangent {over}", feedthrough=f)
     outputs.append(Variable(f"{p}.work", "output", "J", 0.0, "work done on the cable through this port"))
     return inputs, outputs
 
@@ -149,7 +151,8 @@ class Cable:
         self._use_alpha = self["integrator"] == 1.0
         self._work = dynamics.make_work(n, self.state.size)
         dynamics.factorise_mass(self.model, q, self._work)
-        self.show()
+        self.refresh()
+        self._diagnose(np.zeros_like(self._ports))  # at rest, before any load
         self._shown_ports[:, 12:18] = self._shown_ports[:, :6]
         self._shown_ports[:, 18] = 0.0
 
@@ -181,12 +184,14 @@ class Cable:
             return 0.5 * self["level_difference"] - point[2] - self["sag"]
 
         chord = float(np.hypot(self["span"], self["level_difference"]))
-        longest = chord * (1.0 + 4.0 * (self["sag"] / chord) ** 2) + self["sag"] * 0.01
+        parabola = chord * (1.0 + 4.0 * (self["sag"] / chord) ** 2) + self["sag"] * 0.01
+        longest = min(parabola, chord + 2.1 * self["sag"])
         try:
-            return float(brentq(excess, 0.99 * chord, longest, xtol=1e-9 * chord))
+            return float(root_scalar(excess, bracket=(0.99 * chord, longest), xtol=1e-12 * chord).root)
         except ValueError:
             raise ModuleError(
-                f"cable: sag: {self['sag']:g} m cannot be reached; check it against span, axial_stiffness and linear_density"
+                f"cable: sag: {self['sag']:g} m cannot be reached; "
+                "check it against span, axial_stiffness and linear_density"
             ) from None
 
     def _check(self) -> None:
@@ -236,18 +241,22 @@ class Cable:
             )
 
     def refresh(self) -> None:
-        """Write the motion of the ports at the present state and arc lengths; all else stays as the last step left it."""
+        """Write the motion of the ports at the present state and arc lengths; all else stays as it is."""
         dynamics.show_ports(self.model, self.state, self._ports, self._shown_ports, self._work)
 
     def show(self) -> None:
         """Write all outputs but means and work at the present state, whoever has put it there."""
         self.refresh()
+        self._diagnose(self._ports)
+
+    def _diagnose(self, ports: np.ndarray) -> None:
+        """Write tensions, energies, reactions and the shape; `ports` (N_PORTS, 13) are the loads that act."""
         dynamics.diagnose(
             self.model,
             self._collocation,
             self._use_alpha,
             self.state,
-            self._ports,
+            ports,
             self._shown,
             self._shape,
             self._work,

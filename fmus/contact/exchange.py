@@ -417,9 +417,7 @@ def step(prm, method, inputs, h, nodes, weights, increments, state, path, motion
             waveform_path(start, inputs, path)
         else:
             hermite_path(start, inputs, h, path)
-        status, dissipated = sample_law(
-            prm, path, h, nodes, weights, increments, end, z, motions, samples
-        )
+        status, dissipated = sample_law(prm, path, h, nodes, weights, increments, end, z, motions, samples)
     if status != OK:
         return status
     if method != POINT:

@@ -39,16 +39,12 @@ def _parameters() -> list[Variable]:
         ),
         real("exponent", "1", 2.5, "exponent n of the penetration"),
         real("damping", "s/m", 1.0, "Hunt-Crossley damping D, factor 1 + D * penetration rate"),
-        real(
-            "friction_coefficient", "1", 0.7, "Coulomb friction coefficient on the sum of both walls' forces"
-        ),
+        real("friction_coefficient", "1", 0.7, "Coulomb friction coefficient on the sum of both walls' forces"),
         real("wheel_radius", "m", 0.075, "radius of the wheel's rim"),
         real("groove_angle", "rad", 1.7453292519943295, "full opening angle of the groove"),
         real("groove_width", "m", 0.08, "width of the groove at the rim"),
         real("cable_diameter", "m", 0.018, "diameter of the cable"),
-        real(
-            "max_contact_length", "m", 0.06, "longest contact length l0; stiffness / l0 acts per unit length"
-        ),
+        real("max_contact_length", "m", 0.06, "longest contact length l0; stiffness / l0 acts per unit length"),
         real("tangential_stiffness", "N/m", 1e6, "stiffness of the friction bristle before it slides"),
         real("tangential_damping", "N.s/m", 1e3, "damping of the friction bristle before it slides"),
         real("initial.s", "m", 0.0, "arc length of the contact point on the unstretched cable at the start"),
@@ -181,9 +177,7 @@ class Contact:
     def step(self, t: float, h: float) -> None:
         """Advance from t to t + h; the inputs hold the motion at t + h and the means over the step."""
         if not h > 0.0:
-            raise ModuleError(
-                f"contact at t = {t:g} s: macro step {h:g} s must be positive; choose one above zero"
-            )
+            raise ModuleError(f"contact at t = {t:g} s: macro step {h:g} s must be positive; choose one above zero")
         status = exchange.step(
             self._prm,
             self._method,
@@ -217,13 +211,9 @@ class Contact:
     def _check_groove(self) -> None:
         exponent, angle = self._value("exponent"), self._value("groove_angle")
         if exponent < 1.0:
-            raise ModuleError(
-                f"contact: exponent = {exponent:g} makes the wall infinitely stiff at touch; use >= 1"
-            )
+            raise ModuleError(f"contact: exponent = {exponent:g} makes the wall infinitely stiff at touch; use >= 1")
         if angle >= math.pi:
-            raise ModuleError(
-                f"contact: groove_angle = {angle:g} rad must be below pi; is it given in degrees?"
-            )
+            raise ModuleError(f"contact: groove_angle = {angle:g} rad must be below pi; is it given in degrees?")
         depth = 0.5 * self._value("groove_width") / math.tan(0.5 * angle)
         if depth >= self._value("wheel_radius"):
             raise ModuleError(
@@ -237,6 +227,4 @@ class Contact:
         if status == NO_AXLE:
             raise ModuleError(f"contact{when}: wheel.axle has no length; connect it to the robot's wheel")
         if status == NOT_FINITE:
-            raise ModuleError(
-                f"contact{when}: the motion of cable or wheel is not finite; take a smaller macro step"
-            )
+            raise ModuleError(f"contact{when}: the motion of cable or wheel is not finite; take a smaller macro step")

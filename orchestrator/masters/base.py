@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+import re
 from collections import deque
 from dataclasses import dataclass
 from math import nan
@@ -136,9 +137,7 @@ class Loads:
 def _takes_means(node: Node) -> bool:
     """Return whether a component has inputs for the time means of others."""
     ports = node.fmu.ports
-    return any(
-        port.causality == "input" and suffixed(name, "_mean") in ports for name, port in ports.items()
-    )
+    return any(port.causality == "input" and suffixed(name, "_mean") in ports for name, port in ports.items())
 
 
 class Between:
@@ -155,9 +154,7 @@ class Between:
         self.graph = graph
         self.start_values = graph.u.copy()
         self.places = {node.name: self._places(node, loads, torn) for node in graph.nodes}
-        self.rates = {
-            name: np.flatnonzero(np.isin(graph.rate_of, places)) for name, places in self.places.items()
-        }
+        self.rates = {name: np.flatnonzero(np.isin(graph.rate_of, places)) for name, places in self.places.items()}
 
     @staticmethod
     def _places(node: Node, loads: Loads, torn: bool) -> np.ndarray:
@@ -193,11 +190,19 @@ def step_node(between: Between | None, node: Node, t: float, H: float) -> None:
     if node.rates.names:
         node.rates.set()
     node.fmu.step(t, H)
+    node.acted[:] = node.inputs.values
     if ends is not None:
         node.inputs.values[:] = ends
         if node.feedthrough:
             node.inputs.set()
     node.outputs.get_finite()
+
+
+def vectors(names: list[str]) -> np.ndarray:
+    """Return for each name the number of the vector it is a component of, (len(names),) int: x, y, z have one."""
+    stems = [re.sub(r"\.[xyz]$", "", name) for name in names]
+    number = {stem: i for i, stem in enumerate(dict.fromkeys(stems))}
+    return np.array([number[stem] for stem in stems], dtype=np.intp)
 
 
 def require_rollback(graph: Graph, master: str) -> None:

@@ -9,15 +9,15 @@ each.
 from __future__ import annotations
 
 import contextlib
-import re
-from typing import ClassVar
+from typing import Any, ClassVar
 
 import numpy as np
 
 from orchestrator.fmu import ERROR, FmuError, Group, Port, State
 from orchestrator.graph import Graph
-from orchestrator.masters.base import Between, Loads, Master, StepReport, require_rollback, step_node
+from orchestrator.masters.base import Between, Loads, Master, StepReport, require_rollback, step_node, vectors
 from orchestrator.masters.predictor import Predictor
+from orchestrator.masters.step_control import StepControl
 
 REPLAY = 1e-12  # relative difference of the outcomes of the same step from the same state
 DIVERGED = 1e6  # growth of the residual over its first value that ends an iteration
@@ -55,6 +55,7 @@ class Implicit(Master):
     max_iterations : iterations of one step before it is sub-divided
     max_depth : the macro step is halved at most so often
     predictor : order of the prediction of the unknowns, or -1: the one that did best lately
+    local_tolerance : if positive, sub-steps are made as short as this local error asks for (see `StepControl`)
     """
 
     IMPLICIT: ClassVar[bool] = True
@@ -69,6 +70,7 @@ class Implicit(Master):
         max_iterations: int = 25,
         max_depth: int = 6,
         predictor: int = -1,
+        local_tolerance: float = 0.0,
     ):
         super().__init__(graph)
         require_rollback(graph, self.NAME)
@@ -79,6 +81,7 @@ class Implicit(Master):
         self.predictor = Predictor(predictor)
         self.scale = Scale(graph, self.loads, absolute)
         self.places = graph.torn
+        self.control = StepControl(self, local_tolerance, absolute, max_depth) if local_tolerance > 0.0 else None
 
     def start(self, t: float) -> None:
         """Prepare for the first step."""
@@ -88,13 +91,18 @@ class Implicit(Master):
         self.x = self.graph.u[self.places]
         self.checked = False
         self.failure: FmuError | None = None
+        if self.control is not None:
+            self.control.start()
 
     def step(self, t: float, H: float) -> StepReport:
         """Advance all components from `t` to `t + H`; never leaves an unconverged step unsaid."""
         if not self.checked:
             self._check_replay(t, H)
         report = StepReport(t + H, iterations=0)
-        self._advance(t, H, 0, report)
+        if self.control is not None:
+            self.control.advance(t, H, report)
+        else:
+            self.advance(t, H, 0, report)
         report.columns = self.accelerator.columns
         return report
 
@@ -105,9 +113,8 @@ class Implicit(Master):
             outputs = node.fmu.group([p.name for p in node.fmu.ports.values() if _is_real_output(p)])
             state, outcomes = node.fmu.save(), []
             for _ in range(2):
-                with contextlib.suppress(
-                    FmuError
-                ):  # what fails here fails again in the step, and is dealt with there
+                # what fails here fails again in the step, and is dealt with there
+                with contextlib.suppress(FmuError):
                     node.inputs.set()
                     node.fmu.step(t, H)
                     outputs.get_finite()
@@ -117,7 +124,7 @@ class Implicit(Master):
             if len(outcomes) == 2:
                 _compare(outputs, t, outcomes[0], outcomes[1])
 
-    def _advance(self, t: float, H: float, depth: int, report: StepReport) -> None:
+    def advance(self, t: float, H: float, depth: int, report: StepReport) -> None:
         """Advance by `H`, by halves if the iteration does not converge."""
         self.graph.exchange_discrete()
         states = self.graph.save()
@@ -135,11 +142,26 @@ class Implicit(Master):
         finally:
             self.graph.release(states)
         report.subdivisions += 1
-        self._advance(t, H / 2, depth + 1, report)
-        self._advance(t + H / 2, H / 2, depth + 1, report)
+        self.advance(t, H / 2, depth + 1, report)
+        self.advance(t + H / 2, H / 2, depth + 1, report)
+
+    def snapshot(self) -> tuple[Any, ...]:
+        """Return all that a step changes, the states of the components first (to be released)."""
+        graph = self.graph
+        observers = [observer.save() for observer in graph.observers]
+        return graph.save(), graph.u.copy(), graph.y.copy(), self.x, self.predictor.save(), observers
+
+    def revert(self, snapshot: tuple[Any, ...]) -> None:
+        """Go back to a snapshot."""
+        states, u, y, self.x, predictor, observers = snapshot
+        self.graph.restore(states)
+        self.graph.u[:], self.graph.y[:] = u, y
+        self.predictor.restore(predictor)
+        for observer, saved in zip(self.graph.observers, observers, strict=True):
+            observer.restore(saved)
 
     def _accept(self, t: float, H: float) -> None:
-        self.predictor.append(t + H / 2, self.x)
+        self.predictor.append(t + H / 2, self.x, self.scale.values)
         if self.graph.observers:
             self.graph.accepted(t, H)
         self.graph.gather()
@@ -241,14 +263,12 @@ class Scale:
 
     def __init__(self, graph: Graph, loads: Loads, absolute: float):
         places, names = graph.torn, [graph.input_names[i] for i in graph.torn]
-        stems = [re.sub(r"\.[xyz]$", "", name) for name in names]
-        keys = {stem: i for i, stem in enumerate(dict.fromkeys(stems))}
-        self.vector = np.array([keys[stem] for stem in stems], dtype=np.intp)
+        self.vector = vectors(names)
         where = {int(place): i for i, place in enumerate(places)}
         pairs = [(where[a], where[b]) for a, b in loads.fed.tolist() if a in where and b in where]
         self.load, self.rate = np.array(pairs, dtype=np.intp).reshape(-1, 2).T
         self.absolute = absolute
-        self.largest = np.zeros(len(keys))
+        self.largest = np.zeros(int(self.vector.max(initial=-1)) + 1)
         self.values = np.ones(len(names))
 
     def reset(self) -> None:

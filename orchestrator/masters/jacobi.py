@@ -59,6 +59,7 @@ class Jacobi(Master):
                 node.rates.set()
             node.fmu.step(t, H)
         if graph.observers:
+            graph.acted[:] = graph.u
             graph.accepted(t, H)
         graph.refresh()
 

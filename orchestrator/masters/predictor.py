@@ -7,7 +7,7 @@ from collections import deque
 import numpy as np
 
 HIGHEST = 3
-FORGET = 0.5  # weight of the past in the record of how well each order did
+FORGET = 0.8  # weight of the past in the record of how well each order did
 
 
 class Predictor:
@@ -16,7 +16,7 @@ class Predictor:
 
     Parameters
     ----------
-    order : 0 … 3, or -1: chosen in every step by the errors each order would have made (half-life one step)
+    order : 0 … 3, or -1: chosen in every step by the errors each order would have made
     """
 
     def __init__(self, order: int = -1):
@@ -31,12 +31,21 @@ class Predictor:
         self.predictions: list[np.ndarray] = []
         self.errors = np.zeros(HIGHEST + 1)
 
-    def append(self, time: float, x: np.ndarray) -> None:
-        """Remember the converged unknowns `x` (n,) of the step around `time`."""
+    def save(self) -> tuple[list, list, np.ndarray]:
+        """Return what `restore` needs."""
+        return list(self.points), self.predictions, self.errors.copy()
+
+    def restore(self, saved: tuple[list, list, np.ndarray]) -> None:
+        """Go back."""
+        points, self.predictions, errors = saved
+        self.points = deque(points, maxlen=HIGHEST + 1)
+        self.errors = errors.copy()
+
+    def append(self, time: float, x: np.ndarray, scale: np.ndarray) -> None:
+        """Remember the converged unknowns `x` (n,), of magnitudes `scale` (n,), of the step around `time`."""
         for k, guess in enumerate(self.predictions):
-            self.errors[k] = FORGET * self.errors[k] + float(
-                np.sum(np.abs(guess - x) / (np.abs(x) + np.abs(guess) + 1e-30))
-            )
+            error = (guess - x) / scale
+            self.errors[k] = FORGET * self.errors[k] + np.sqrt(error @ error)
         self.points.appendleft((time, x.copy()))
 
     def predict(self, time: float, fallback: np.ndarray) -> np.ndarray:

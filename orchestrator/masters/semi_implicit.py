@@ -53,7 +53,7 @@ class SemiImplicit(Implicit):
         self.jacobian: np.ndarray | None = None
         self.age, self.wanted = 0, False
 
-    def _advance(self, t: float, H: float, depth: int, report: StepReport) -> None:
+    def advance(self, t: float, H: float, depth: int, report: StepReport) -> None:
         self.graph.exchange_discrete()
         states = self.graph.save()
         try:

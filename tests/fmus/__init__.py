@@ -3,11 +3,17 @@
 from __future__ import annotations
 
 import atexit
+import shutil
+import subprocess
 import tempfile
+import zipfile
 from functools import cache
 from pathlib import Path
 
 import numpy as np
+from fmpy import platform, platform_tuple
+from fmpy.fmi2 import FMU2Model, FMU2Slave
+from fmpy.fmi3 import FMU3Model, FMU3ScheduledExecution, FMU3Slave
 from pythonfmu import FmuBuilder
 from scipy.linalg import expm
 
@@ -27,11 +33,46 @@ def _folder() -> Path:
 
 @cache
 def build(name: str, *, rollback: bool = True) -> Path:
-    """Build ``NAME_fmu.py`` of this folder, once a process; return the FMU."""
+    """Build ``NAME_fmu.py`` of this folder, once a process (``wave`` from ``link``); return the FMU."""
     folder = _folder() / ("" if rollback else "no_rollback")
     folder.mkdir(exist_ok=True)
+    script = SCRIPTS / f"{name}_fmu.py"
+    if name == "wave":
+        text = (SCRIPTS / "link_fmu.py").read_text(encoding="utf-8")
+        script = folder / script.name
+        script.write_text(text.replace("WAVE = False", "WAVE = True").replace("LinkTest", "WaveTest"), encoding="utf-8")
     options = {**OPTIONS, "canGetAndSetFMUstate": rollback, "canSerializeFMUstate": rollback}
-    return Path(FmuBuilder.build_FMU(str(SCRIPTS / f"{name}_fmu.py"), dest=str(folder), **options))
+    return Path(FmuBuilder.build_FMU(str(script), dest=str(folder), **options))
+
+
+def compiler() -> str | None:
+    """Return the C compiler of this machine, if it has one."""
+    return shutil.which("cc") or shutil.which("gcc")
+
+
+@cache
+def compiled(name: str) -> Path:
+    """Compile a test FMU in C, ``lag2`` (FMI 2.0) or ``lag3`` (FMI 3.0), on Linux; return it."""
+    library, path = _folder() / f"{name}.so", _folder() / f"{name}.fmu"
+    text = (SCRIPTS / f"{name}.c").read_text(encoding="utf-8")
+    prefix, interfaces = ("fmi2", [FMU2Slave, FMU2Model])
+    if name == "lag3":
+        prefix, interfaces = "fmi3", [FMU3Slave, FMU3Model, FMU3ScheduledExecution]
+    known = {n for interface in interfaces for n in dir(interface) if n.startswith(prefix)}
+    # the standard wants every function there; those that are not used answer with an error
+    text += "".join(
+        f"int {function}(void) {{ return 3; }}\n"
+        for function in sorted(known)
+        if f" {function}(" not in text and f"*{function}(" not in text
+    )
+    source = _folder() / f"{name}.c"
+    source.write_text(text, encoding="utf-8")
+    subprocess.run([str(compiler()), "-shared", "-fPIC", "-O1", str(source), "-o", str(library)], check=True)
+    folder = platform if prefix == "fmi2" else platform_tuple
+    with zipfile.ZipFile(path, "w") as archive:
+        archive.write(SCRIPTS / f"{name}.xml", "modelDescription.xml")
+        archive.write(library, f"binaries/{folder}/{name}.so")
+    return path
 
 
 def fmu(kind: str, name: str, *, rollback: bool = True, **parameters: float | int | str) -> Fmu:
@@ -59,7 +100,7 @@ def oscillator(
     (force-displacement)."""
     a = fmu("link", "a", rollback=rollback, mass=MASS, ground_stiffness=GROUND, initial_position=start[0])
     b = fmu(
-        "link",
+        "wave" if waveform else "link",
         "b",
         mass=MASS,
         ground_stiffness=ground,
@@ -67,7 +108,6 @@ def oscillator(
         stiffness=stiffness,
         damping=damping,
         initial_position=start[1],
-        waveform=float(waveform),
     )
     pairs = [("a.position", "b.left.position"), ("b.left.force", "a.force")]
     if waveform:
@@ -95,13 +135,12 @@ def chain(n: int, *, waveform: bool, stiffness: float = 200.0) -> Graph:
     components, connections = {}, []
     for i in range(n):
         components[f"m{i}"] = fmu(
-            "link",
+            "wave" if waveform else "link",
             f"m{i}",
             mass=1.0,
             ground_stiffness=10.0,
             stiffness=stiffness if i else 0.0,
             initial_position=0.0 if i else 0.1,
-            waveform=float(waveform),
         )
     for i in range(1, n):
         left, right = f"m{i - 1}", f"m{i}"

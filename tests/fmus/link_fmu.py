@@ -2,8 +2,8 @@
 step.
 
 m x'' = -k0 x - c0 x' - f + F, with f = k (x - x_left) + c (x' - v_left) the force on the left neighbour and
-F = force + force_rate (tau - t - h/2). With waveform = 0 `left.position` and `left.velocity` are held during
-a step and `left.force` is f at its end; with waveform = 1 the left neighbour moves on the quadratic through
+F = force + force_rate (tau - t - h/2). Without WAVE `left.position` and `left.velocity` are held during
+a step and `left.force` is f at its end; with WAVE the left neighbour moves on the quadratic through
 the start, the end and the mean of its position, and `left.force`, `left.force_rate` are the mean and the
 slope of f.
 """
@@ -14,32 +14,20 @@ import numpy as np
 from pythonfmu import Fmi2Causality, Fmi2Slave, Fmi2Variability, Real
 from scipy.linalg import expm
 
+WAVE = False  # the build makes a second FMU, WaveTest, by turning this to True
 PARAMETERS = ["mass", "ground_stiffness", "ground_damping", "stiffness", "damping"]
-PARAMETERS += ["initial_position", "initial_velocity", "waveform"]
-INPUTS = ["left.position", "left.velocity", "force", "force_rate", "left.position_mean"]
-OUTPUTS = ["position", "velocity", "position_mean", "left.force", "left.force_rate"]
+PARAMETERS += ["initial_position", "initial_velocity"]
+INPUTS = ["left.position", "left.velocity", "force", "force_rate"]
+OUTPUTS = ["position", "velocity", "position_mean", "left.force"]
+UNITS = ["kg", "N/m", "N.s/m", "N/m", "N.s/m", "m", "m/s", "m", "m/s", "N", "N/s", "m", "m/s", "m", "N"]
 NAMES = PARAMETERS + INPUTS + OUTPUTS
-UNITS = [
-    "kg",
-    "N/m",
-    "N.s/m",
-    "N/m",
-    "N.s/m",
-    "m",
-    "m/s",
-    "1",
-    "m",
-    "m/s",
-    "N",
-    "N/s",
-    "m",
-    "m",
-    "m/s",
-    "m",
-    "N",
-    "N/s",
-]
-M, K0, C0, K, C, X0, V0, WAVEFORM, XL, VL, F, FR, XLM, X, V, XM, LF, LFR = range(len(NAMES))
+_, K0, C0, K, C, X0, V0, XL, VL, F, FR, X, V, XM, LF = range(len(NAMES))
+if WAVE:
+    NAMES += ["left.position_mean", "left.force_rate"]
+    UNITS += ["m", "N/s"]
+    INPUTS.append("left.position_mean")
+    OUTPUTS.append("left.force_rate")
+XLM, LFR = 15, 16
 BASE = {"kg": {"kg": 1}, "N/m": {"kg": 1, "s": -2}, "N.s/m": {"kg": 1, "s": -1}, "m": {"m": 1}}
 BASE |= {
     "1": {},
@@ -85,7 +73,7 @@ class LinkTest(Fmi2Slave):
         return root
 
     def get_real(self, vrs):
-        if LF in vrs and not self.values[WAVEFORM]:
+        if LF in vrs and not WAVE:
             self._reaction()
         return [self.values[i] for i in vrs]
 
@@ -125,7 +113,7 @@ class LinkTest(Fmi2Slave):
         start = np.array([0.0, 0.0, 0.0, v[X], v[V], v[F] - v[FR] * h / 2, v[FR], *self._left_motion(h)])
         end = self._matrix(h) @ start
         v[XM], v[X], v[V] = end[2] / h, end[3], end[4]
-        if v[WAVEFORM]:
+        if WAVE:
             v[LF], v[LFR] = end[1] / h, 12 / h**3 * (h / 2 * end[1] - end[0])
             self.left = v[XL]
         return True
@@ -133,7 +121,7 @@ class LinkTest(Fmi2Slave):
     def _left_motion(self, h):
         """Position, velocity and acceleration of the left neighbour at the start of the step."""
         v = self.values
-        if not v[WAVEFORM]:
+        if not WAVE:
             return v[XL] + (v[C] / v[K] if v[K] else 0.0) * v[VL], 0.0, 0.0
         b = 6 * ((self.left + v[XL]) / 2 - v[XLM])
         a = v[XL] - self.left - b

@@ -2,6 +2,6 @@
 
 from types import ModuleType
 
-from verification.cable import statics
+from verification.cable import large_rotation, point_mass, statics, time_steps, vibration
 
-STUDIES: tuple[ModuleType, ...] = (statics,)
+STUDIES: tuple[ModuleType, ...] = (statics, large_rotation, vibration, time_steps, point_mass)

@@ -1,0 +1,130 @@
+"""Error control inside a macro step: step doubling by rollback, sub-steps of H/2^k."""
+
+from __future__ import annotations
+
+import re
+from typing import TYPE_CHECKING
+
+import numpy as np
+
+from orchestrator.fmu import suffixed
+from orchestrator.graph import Graph, Node
+from orchestrator.masters.base import StepReport, vectors
+
+if TYPE_CHECKING:
+    from orchestrator.masters.implicit import Implicit
+
+ORDER = 4  # of the `waveform` exchange; a local error of order 5
+SAFETY = 0.25  # a step is made longer when its error would stay below this share of the tolerance
+
+
+# outputs that say something about the step, not about its end
+INTERVAL = re.compile(r"(_mean|\brotation)(\.[xyz])?$")
+
+
+class StepControl:
+    """Advances a macro step in sub-steps whose local error is below a tolerance.
+
+    Each sub-step h is made once as a whole and once in two halves; the difference of the motions, times 2^p/(2^p - 1)
+    with p = 4, estimates the local error of the whole, and the halves are kept. Too large: rolled back, h halved. Small
+    enough: h doubled, at most to the macro step, so that whoever records sees the same times as ever. The lengths are
+    the macro step over powers of two because Jacobians and columns serve one length each. (With lengths so coarse a PI
+    controller has nothing to smooth.)
+
+    Parameters
+    ----------
+    tolerance : local error of an output, relative to the range it has gone through (x, y, z of a vector
+        together)
+    absolute : smallest such range, in the output's unit
+    deepest : h is at least H/2^deepest
+    """
+
+    def __init__(self, master: Implicit, tolerance: float, absolute: float, deepest: int):
+        self.master, self.tolerance, self.deepest = master, tolerance, deepest
+        self.range = Range(master.graph, absolute)
+        self.level = 0
+
+    def start(self) -> None:
+        """Begin with whole macro steps."""
+        self.level = 0
+        self.range.start()
+
+    def advance(self, t: float, H: float, report: StepReport) -> None:
+        """Advance by the macro step `H`."""
+        done, whole, worst = 0, 2**self.deepest, 0.0
+        while done < whole:
+            length = whole >> self.level
+            if done % length:  # a longer step must begin where one of its length would
+                self.level += 1
+                continue
+            h = H * length / whole
+            error = self._attempt(t + H * done / whole, h, report)
+            if error > self.tolerance and self.level < self.deepest:
+                self.level += 1
+                report.subdivisions += 1
+                continue
+            worst = max(worst, error)
+            done += length
+            if error < SAFETY * self.tolerance / 2 ** (ORDER + 1) and self.level > 0:
+                self.level -= 1
+        report.estimate = worst
+
+    def _attempt(self, t: float, h: float, report: StepReport) -> float:
+        """Make the step whole, then in halves; return the error. If it is too large, all is as before."""
+        master = self.master
+        before = master.snapshot()
+        try:
+            master.advance(t, h, 0, report)
+            coarse = master.graph.y.copy()
+            master.revert(before)
+            master.advance(t, h / 2, 0, report)
+            master.advance(t + h / 2, h / 2, 0, report)
+            error = self.range.norm(coarse - master.graph.y) * 2**ORDER / (2**ORDER - 1)
+            if error > self.tolerance and self.level < self.deepest:
+                master.revert(before)
+            else:
+                self.range.update()
+        finally:
+            master.graph.release(before[0])
+        return error
+
+
+class Range:
+    """Peak-to-peak of the motions, by which their errors are measured.
+
+    A motion is an output, with a ``_mean`` companion, of a component whose inputs are all torn; if there is
+    none, any output at an instant. Means over the step and rotations within it belong to one length of step
+    and are left out.
+    """
+
+    def __init__(self, graph: Graph, absolute: float):
+        self.graph, self.absolute = graph, absolute
+        pairs = [(node, name) for node in graph.nodes for name in node.outputs.names]
+        instants = [i for i, (_, name) in enumerate(pairs) if not INTERVAL.search(name)]
+        motions = [i for i in instants if _is_motion(graph, *pairs[i])]
+        self.places = np.array(motions or instants, dtype=np.intp)
+        self.vector = vectors([f"{pairs[i][0].name}.{pairs[i][1]}" for i in self.places])
+        self.start()
+
+    def start(self) -> None:
+        """Begin at the present values."""
+        self.low = self.graph.y[self.places]
+        self.high = self.low.copy()
+
+    def update(self) -> None:
+        """Take the present values into account."""
+        np.minimum(self.low, self.graph.y[self.places], out=self.low)
+        np.maximum(self.high, self.graph.y[self.places], out=self.high)
+
+    def norm(self, difference: np.ndarray) -> float:
+        """Return the largest of `difference` (n_y,), relative to the range of its vector."""
+        largest = np.zeros(int(self.vector.max(initial=-1)) + 1)
+        np.maximum.at(largest, self.vector, self.high - self.low)
+        scale = largest[self.vector] + self.absolute
+        return float(np.max(np.abs(difference[self.places]) / scale, initial=0.0))
+
+
+def _is_motion(graph: Graph, node: Node, name: str) -> bool:
+    port = node.fmu.ports[name]
+    moved = set(node.discrete_inputs.names) & (graph.feedthrough[node.name].get(port.variable) or frozenset())
+    return not node.forward.size and not moved and suffixed(name, "_mean") in node.fmu.ports
