@@ -252,7 +252,7 @@ def recorded(graph: Graph) -> list[str]:
         f"{component}.{name}"
         for component, fmu in graph.components.items()
         for name, port in fmu.ports.items()
-        if port.causality == "output" and port.kind != "string" and not _only_couples(name, contacts)
+        if port.causality == "output" and port.is_number and not _only_couples(name, contacts)
     ]
 
 
