@@ -14,7 +14,7 @@ import matplotlib
 
 from verification.study import page_section
 
-SECTIONS = {"cable": "Cable"}
+SECTIONS = {"cable": "Cable", "coupling": "Coupling"}
 """Package below `verification` → heading, in the order of the page."""
 ROOT = Path(__file__).resolve().parent.parent
 PAGE = ROOT / "docs" / "verification.md"
