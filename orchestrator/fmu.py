@@ -204,9 +204,7 @@ class Group:
         for port in ports:
             if not port.is_number:
                 raise ValueError(f"{fmu.name}: {port.name} is a {port.kind} and has no place among numbers")
-        self.runs = [
-            _Run(fmu, kind, [ports[i] for i in pick], pick, self.values) for kind, pick in picks.items()
-        ]
+        self.runs = [_Run(fmu, kind, [ports[i] for i in pick], pick, self.values) for kind, pick in picks.items()]
 
         # one direct run is the common case: its call is used as it is
         direct = len(self.runs) == 1 and self.runs[0].direct
