@@ -114,10 +114,7 @@ def state_size(n: int) -> int:
 
 @kernel
 def residual(model, q, v, a, external, force, axial, work):
-    """Write M a + Q(q, v) - weight - external to `force` (n,), before the supports are applied.
-
-    Return dissipated power.
-    """
+    """Write M a + Q(q, v) - weight - external to `force` (n,), supports not applied; return dissipated power."""
     power = internal_force(model, q, v, force, axial, work)[1]
     add_inertia(model, a, force, work)
     for i in range(force.size):
@@ -175,7 +172,7 @@ def _same_key(key, q, v, h):
     n = q.size
     if key[2 * n] != h:
         return False
-    for i in range(n):
+    for i in range(n):  # noqa: SIM110
         if key[i] != q[i] or key[n + i] != v[i]:
             return False
     return True
@@ -281,9 +278,9 @@ def collocation_step(model, method, state, h, offset, ports, tolerance, fresh, w
 def generalized_alpha_step(model, method, state, h, offset, ports, tolerance, fresh, work):
     """Advance the flat `state` by one inner step of generalized-alpha; parameters as in `collocation_step`.
 
-    Chung & Hulbert 1993, eqs. (5)–(9), with all forces at the generalised midpoint t + (1 - alpha_f) h: the load of
-    a macro step is then never taken from its neighbour. The first row of accelerations is a, the second its value
-    at the midpoint. `start_alpha` and `end_alpha` enclose the inner steps of a macro step.
+    Chung & Hulbert 1993, eqs. (5)–(9), with all forces at the generalised midpoint t + (1 - alpha_f) h: the load of a
+    macro step is then never taken from its neighbour. The first row of accelerations is a, the second its value at the
+    midpoint. `start_alpha` and `end_alpha` enclose the inner steps of a macro step.
     """
     n = model.weight.size
     q0, v0, a, sums = state[:n], state[n : 2 * n], state[2 * n : 4 * n].reshape(2, n), state[4 * n :]
@@ -482,8 +479,8 @@ def diagnose(model, method, use_alpha, state, ports, out, rows, work):
     Parameters
     ----------
     ports : (N_PORTS, 13), the loads of the macro step that has just been made
-    out : (13,), receives tension left, mid, right, kinetic, elastic, gravitational and dissipated energy, force of
-        the left support (3) and of the right one (3) on the cable
+    out : (13,), receives tension left, mid, right, kinetic, elastic, gravitational and dissipated energy, force of the
+        left support (3) and of the right one (3) on the cable
     rows : (m, 4), receives position and axial force at equally spaced arc lengths
     """
     n = model.weight.size

@@ -78,8 +78,9 @@ def _port(k: int) -> tuple[list[Variable], list[Variable]]:
     outputs += vector(f"{p}.velocity", "output", "m/s", "velocity of the contact point", feedthrough=f)
     outputs += vector(f"{p}.tangent_rate", "output", "1/s", "rate of dr/ds", feedthrough=f)
     # before the first step the means are the values, hence their dependence on s
-    outputs += vector(f"{p}.position_mean", "output", "m", "its time mean over the last macro step", feedthrough=f)
-    outputs += vector(f"{p}.tangent_mean", "output", "1", "its time mean over the last macro step", feedthrough=f)
+    over = "over the last macro step"
+    outputs += vector(f"{p}.position_mean", "output", "m", f"time mean of position {over}", feedthrough=f)
+    outputs += vector(f"{p}.tangent_mean", "output", "1", f"time mean of tangent {over}", feedthrough=f)
     outputs.append(Variable(f"{p}.work", "output", "J", 0.0, "work done on the cable through this port"))
     return inputs, outputs
 
@@ -189,8 +190,8 @@ class Cable:
             return float(root_scalar(excess, bracket=(0.99 * chord, longest), xtol=1e-12 * chord).root)
         except ValueError:
             raise ModuleError(
-                f"cable: sag: {self['sag']:g} m cannot be reached; check it against span, axial_stiffness and "
-                "linear_density"
+                f"cable: sag: {self['sag']:g} m cannot be reached; "
+                "check it against span, axial_stiffness and linear_density"
             ) from None
 
     def _check(self) -> None:
@@ -240,10 +241,7 @@ class Cable:
             )
 
     def refresh(self) -> None:
-        """Write the motion of the ports at the present state and arc lengths.
-
-        All else stays as the last step left it.
-        """
+        """Write the motion of the ports at the present state and arc lengths; all else stays as it is."""
         dynamics.show_ports(self.model, self.state, self._ports, self._shown_ports, self._work)
 
     def show(self) -> None:
