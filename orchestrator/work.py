@@ -6,8 +6,8 @@ F + Ḟ (tau - t - H/2), so that its work is F·Δx + Ḟ·(H/2 (x0 + x1) - H x�
 (integral of the angular velocity over the step, hence x0 = 0) and ``X.rotation_mean``.
 
 The component that gives the load books the same work with what it knows: the load it has computed in the step and the
-motion it was told. The difference is the energy that the coupling makes; divided by the step it is the power residual of
-Sadjina et al., Engineering with Computers 33 (2017) 607-620 (ECCO).
+motion it was told. The difference is the energy that the coupling makes; divided by the step it is the power residual
+of Sadjina et al., Engineering with Computers 33 (2017) 607-620 (ECCO).
 """
 
 from __future__ import annotations
@@ -200,5 +200,7 @@ def _giver(
     motion, mean = ([told[node.name, x] for x in names if (node.name, x) in told] for names in (motions, means))
     if len(motion) < len(motions):
         return None
-    where = [np.array(x if len(x) == len(loads) else [], dtype=np.intp) for x in (motion, mean, rates)]
-    return _Giver(*where, relative, np.zeros(len(loads)), np.zeros(len(loads)))
+    told_motion, told_mean, given_rates = (
+        np.array(x if len(x) == len(loads) else [], dtype=np.intp) for x in (motion, mean, rates)
+    )
+    return _Giver(told_motion, told_mean, given_rates, relative, np.zeros(len(loads)), np.zeros(len(loads)))
