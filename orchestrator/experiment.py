@@ -414,6 +414,8 @@ def write_comparison(directory: RunDirectory, comparison: Comparison, runs: list
         directory.write_fields("reference.h5", reference.fields, FIELD_UNITS)
     for coupled in runs:
         write(RunDirectory(directory.path / coupled.label), coupled, reference)
+    if comparison.reference_energy is not None:
+        directory.write_json("reference.json", {"energy": comparison.reference_energy.content()})
     directory.write_json("comparison.json", comparison.content())
     draw_comparison(directory.path, comparison, [coupled.record for coupled in runs])
     error = "; ".join(failures) or None

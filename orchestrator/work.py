@@ -200,7 +200,11 @@ def _giver(
     motion, mean = ([told[node.name, x] for x in names if (node.name, x) in told] for names in (motions, means))
     if len(motion) < len(motions):
         return None
-    told_motion, told_mean, given_rates = (
-        np.array(x if len(x) == len(loads) else [], dtype=np.intp) for x in (motion, mean, rates)
-    )
-    return _Giver(told_motion, told_mean, given_rates, relative, np.zeros(len(loads)), np.zeros(len(loads)))
+    zero = np.zeros(len(loads))
+    m = len(loads)
+    return _Giver(_whole(motion, m), _whole(mean, m), _whole(rates, m), relative, zero, zero)
+
+
+def _whole(places: list[int], m: int) -> np.ndarray:
+    """Return `places` (m,), or none of them where some are missing."""
+    return np.array(places if len(places) == m else [], dtype=np.intp)

@@ -79,9 +79,7 @@ def sampled(contact, start, inputs, h, m=8):
     exchange.motion_at(path, 1.0, h, end)
     exchange.motion_at(path, 0.0, h, motions[0])
     contact_wrench(contact._prm, motions[0], z, first)
-    status, lost = exchange.sample_law(
-        contact._prm, path, h, nodes, weights, increments, end, z, motions, samples
-    )
+    status, lost = exchange.sample_law(contact._prm, path, h, nodes, weights, increments, end, z, motions, samples)
     assert status == 0
     return nodes, weights, motions, samples, lost, first[25] + first[26]
 
@@ -94,9 +92,7 @@ def test_work_booked_is_the_work_of_the_law(seed):
     start, inputs = random_inputs(np.random.default_rng(seed))
     _, weights, motions, samples, *_ = sampled(contact, start, inputs, h)
     w = h * weights
-    law_wheel = w @ np.sum(
-        samples[:8, 6:9] * motions[:8, 18:21] + samples[:8, 9:12] * motions[:8, 21:24], axis=1
-    )
+    law_wheel = w @ np.sum(samples[:8, 6:9] * motions[:8, 18:21] + samples[:8, 9:12] * motions[:8, 21:24], axis=1)
     turn = np.cross(motions[:8, 3:6], motions[:8, 9:12]) / np.sum(motions[:8, 3:6] ** 2, axis=1)[:, None]
     law_push = w @ np.sum(samples[:8, 0:3] * motions[:8, 6:9], axis=1)
     law_turn = w @ np.sum(samples[:8, 3:6] * turn, axis=1)

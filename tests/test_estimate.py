@@ -9,6 +9,7 @@ import numpy as np
 import pytest
 
 from orchestrator.graph import Connection, Graph
+from orchestrator.masters.step_control import SAFETY, StepControl
 from orchestrator.simulation import Log
 from tests.fmus import fmu
 from tests.test_masters import ITERATED, run
@@ -69,3 +70,41 @@ def test_not_booked_where_the_giver_is_not_told_the_motion():
     a, b = fmu("link", "a", mass=1.0), fmu("link", "b", mass=1.0, stiffness=10.0, initial_position=0.1)
     log = run(Graph({"a": a, "b": b}, [Connection("b.left.force", "a.force")]), "jacobi", 0.01, 0.1)
     assert log.energy_residual == {} and np.isnan(log.steps[-1].power_residual)
+
+
+def controlled(master: str = "iqn_ils", **options) -> Log:
+    return spring_between(master, 0.1, tolerance=1e-10, absolute=1e-6, **options)
+
+
+@pytest.mark.parametrize("master", ["iqn_ils", "interface_jacobian"])
+def test_adaptive_error_follows_the_tolerance(master):
+    """Local errors below the tolerance but in the first step, whose range to measure by begins at zero; the global error
+    goes down with the tolerance."""
+    exact = controlled(master, local_tolerance=1e-9).values[:, [0, 2]]
+    errors = []
+    for tolerance in (1e-4, 1e-6):
+        log = controlled(master, local_tolerance=tolerance)
+        assert max(step.estimate for step in log.steps[1:]) <= tolerance
+        errors.append(float(np.max(np.abs(log.values[:, [0, 2]] - exact))))
+    assert errors[1] < 0.1 * errors[0] and errors[0] < 1e-2
+
+
+def test_sub_steps_grow_again():
+    """After a rejection the controller lengthens again: a smooth motion needs the same sub-steps all along."""
+    log = controlled(local_tolerance=1e-6)
+    halves = [step.iterations for step in log.steps]
+    assert log.time == pytest.approx(np.linspace(0.0, 0.5, 6))
+    assert max(halves[1:]) < 2.5 * min(halves[1:])
+    assert sum(step.subdivisions for step in log.steps[1:]) <= 4
+
+
+def test_controller_finds_the_length_that_the_error_allows():
+    """From 1 ms the length wanted grows to what the error allows, where it settles without overshooting much."""
+    control = StepControl.__new__(StepControl)
+    control.tolerance, control.last = 1e-6, 1.0
+    wanted, lengths = 1e-3, []
+    for _ in range(20):  # local error of order five: 1e-6 at 8 ms, 5e-7 is aimed at
+        wanted = control._controlled(wanted, 1e-3, 1e-6 * (1 / 8) ** 5)
+        lengths.append(wanted)
+    assert lengths[-1] == pytest.approx(8e-3 * SAFETY ** (1 / 5), rel=0.02)
+    assert max(lengths) < 1.3 * lengths[-1]

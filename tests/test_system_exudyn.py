@@ -3,7 +3,8 @@
 Needs the extra `crosscheck`; skipped without it. A straight unstretched cable, pinned at both ends, with a mass at
 midspan: both are let go under gravity. Same mesh, same polynomials, but another strain: Exudyn has the engineering
 strain |r'| - 1 where ours has (r'·r' - 1)/2, which makes N = EA e (1 + 3/2 e + …) instead of EA e, and its curvature is
-divided by |r'|². With a strain e the difference is of the order of e, and falls with it.
+divided by |r'|². With a strain e the relative difference is of the order of e, and falls with it: measured 0.90 e at
+38 kg (e = 8.2e-4), 0.97 e at 12 kg, 0.86 e at 3.8 kg.
 """
 
 import numpy as np
@@ -49,7 +50,7 @@ def ours(mass, times):
 
     start = np.zeros(2 * n)
     start[:n].reshape(-1, 6)[:, 1], start[:n].reshape(-1, 6)[:, 4] = model.s, 1.0
-    found = solve_ivp(rates, (0.0, STOP), start, "Radau", times, rtol=1e-7, atol=1e-9)
+    found = solve_ivp(rates, (0.0, STOP), start, "Radau", times, rtol=1e-6, atol=1e-8)
     assert found.success
     return found.y[middle + 2]
 
@@ -81,7 +82,8 @@ def exudyns(mass, times, step):
     )[0]  # fmt: skip
     point = system.AddNode(NodePoint2D(referenceCoordinates=[LENGTH / 2, 0]))
     system.AddObject(MassPoint2D(physicsMass=mass, nodeNumber=point))
-    system.AddLoad(Force(markerNumber=system.AddMarker(MarkerNodePosition(nodeNumber=point)), loadVector=[0, -mass * GRAVITY, 0]))
+    marker = system.AddMarker(MarkerNodePosition(nodeNumber=point))
+    system.AddLoad(Force(markerNumber=marker, loadVector=[0, -mass * GRAVITY, 0]))
     for i in range(2):
         markers = [
             system.AddMarker(MarkerNodeCoordinate(nodeNumber=node, coordinate=i))
@@ -95,7 +97,7 @@ def exudyns(mass, times, step):
     settings = exudyn.SimulationSettings()
     settings.timeIntegration.numberOfSteps = round(STOP / step)
     settings.timeIntegration.endTime = STOP
-    settings.timeIntegration.newton.relativeTolerance = 1e-10
+    settings.timeIntegration.newton.relativeTolerance = 1e-8
     settings.timeIntegration.generalizedAlpha.spectralRadius = 0.9
     settings.solutionSettings.writeSolutionToFile = False
     settings.solutionSettings.sensorsWritePeriod = times[1] - times[0]
@@ -112,7 +114,7 @@ def test_cable_with_a_mass_at_midspan(mass):
     here, coarse, there = ours(mass, times), exudyns(mass, times, 1e-4), exudyns(mass, times, 5e-5)
     scale = np.max(np.abs(here))
     integration = np.max(np.abs(there - coarse))
-    strain = 2.0 * (scale / (LENGTH / 2)) ** 2 / 2.0  # of two straight halves, with room for the overshoot's cubes
+    strain = 0.5 * (scale / (LENGTH / 2)) ** 2  # of two straight halves
     difference = np.max(np.abs(here - there))
-    print(f"mass {mass} kg: largest sag {scale:.4f} m, difference {difference:.2e} m, integration {integration:.2e} m")
-    assert difference < strain * scale + integration
+    assert integration < 1e-2 * difference
+    assert 0.5 * strain * scale < difference < strain * scale

@@ -71,8 +71,9 @@ def _folded(rows: Sequence[Row]) -> str:
     """Return a table behind a line that says how many rows pass and how near the worst one is to its tolerance."""
     worst = max(rows, key=lambda row: row.error / row.tolerance)
     passed = sum(row.passed for row in rows)
-    line = f"{passed} of {len(rows)} quantities within their tolerance; nearest to it: {worst.quantity}, error {worst.error:.1e}"
-    return f"<details><summary>{line} of {worst.tolerance:.0e} allowed</summary>\n\n{_table(rows)}\n\n</details>"
+    line = f"{passed} of {len(rows)} quantities within their tolerance"
+    nearest = f"nearest to it: {worst.quantity}, error {worst.error:.1e} of {worst.tolerance:.0e} allowed"
+    return f"<details><summary>{line}; {nearest}</summary>\n\n{_table(rows)}\n\n</details>"
 
 
 def _table(rows: Sequence[Row]) -> str:
