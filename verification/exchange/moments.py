@@ -140,7 +140,7 @@ def run(figures: Path) -> Result:
     ]
     _figure(figures / "exchange_radius.png")
     smallest = int(np.argmin(damped))
-    remark = f"""The damped variant's spectral radius is smallest, {min(damped):.2f}, at ωH = {omega_h[smallest]:.3g}, and is
+    remark = f"""The damped variant has the spectral radius {min(damped):.2f} at ωH = {omega_h[smallest]:.3g} and
     {damped[-1]:.4f} at 1000: it damps modes near the limit of resolution, and leaves those far beyond as they are."""
     caption = "Spectral radius of a mass on an undamped spring for three exchanges."
     return Result(rows, [("exchange_radius.png", caption)], remark)
