@@ -146,6 +146,8 @@ def run(
     path = _free(out, loaded.name)
     with _progress(quiet) as show:
         coupled = experiment.run(loaded, show(_task(loaded), loaded.simulation.stop_time))
+        if loaded.simulation.estimate != "none":
+            experiment.estimate(coupled, show("error estimate", loaded.simulation.stop_time))
     experiment.write(RunDirectory(path), coupled)
     _print_run(coupled)
     print(f"results in {path}")
@@ -312,8 +314,22 @@ def _print_run(coupled: Coupled) -> None:
         f"{coupled.master}, macro step {log.macro_step:g} s: {len(log.steps)} steps, "
         f"{log.iterations_per_step:.2f} iterations a step, {log.unconverged} unconverged, {log.wall:.2f} s"
     )
+    for line in _estimates(coupled):
+        print(line)
     if coupled.energy is not None:
         print(f"energy drift: {coupled.energy.drift:.2g} J of {coupled.energy.exchanged:.3g} J exchanged")
+
+
+def _estimates(coupled: Coupled) -> Iterator[str]:
+    """Yield a line for each signal with a tolerance: its estimated error beside what is allowed."""
+    from orchestrator.compare import CONSTANT
+
+    for name, error in coupled.estimated_error.items():
+        values, tolerance = coupled.table[name], coupled.scenario.simulation.tolerances[name]
+        share = error / max(float(values.max() - values.min()), CONSTANT)
+        missed = "MISSED" if share > tolerance else "not known, the coarser run failed"
+        verdict = "within" if share <= tolerance else missed
+        yield f"estimated error of {name}: {error:.1e} ({share:.1e} of its range, allowed {tolerance:g}): {verdict}"
 
 
 def _print_comparison(comparison: Comparison) -> None:

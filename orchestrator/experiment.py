@@ -6,7 +6,7 @@ import re
 import signal
 from collections.abc import Callable, Iterable, Iterator, Mapping
 from contextlib import contextmanager
-from dataclasses import dataclass
+from dataclasses import dataclass, field
 from fractions import Fraction
 from functools import reduce
 from math import gcd
@@ -27,6 +27,7 @@ from orchestrator.compare import (
 )
 from orchestrator.contract import BREAKS, check_variables
 from orchestrator.errors import InputError, RunError
+from orchestrator.estimate import coarser, estimated_error, order
 from orchestrator.fmu import Fmu, FmuError
 from orchestrator.graph import Connection, Graph
 from orchestrator.masters import MASTERS, StepReport
@@ -52,6 +53,7 @@ class Coupled:
     table : signals at the communication points, ``time`` first
     fields : arrays over time as in ``fields.h5``; empty for a general graph
     fmus : file and SHA-256 of every component
+    estimated_error : of the signals with a tolerance, in their units; empty where none was asked for
     """
 
     scenario: Scenario
@@ -60,6 +62,7 @@ class Coupled:
     table: Table
     fields: dict[str, np.ndarray]
     fmus: dict[str, dict[str, str]]
+    estimated_error: dict[str, float] = field(default_factory=dict)
 
     @property
     def steps_table(self) -> Table:
@@ -75,7 +78,8 @@ class Coupled:
             "estimate",
             "power_residual",
         )
-        return {name: np.array([getattr(step, name) for step in steps]) for name in names}
+        table = {name: np.array([getattr(step, name) for step in steps]) for name in names}
+        return table | {f"power_residual.{name}": values for name, values in self.log.power_residual.items()}
 
     @property
     def master(self) -> str:
@@ -206,6 +210,23 @@ def run(scenario: Scenario, progress: Progress = lambda _: None) -> Coupled:
     return Coupled(scenario, exchange_of(scenario) if scenario.is_landing else "", log, table, fields, fmus)
 
 
+def estimate(coupled: Coupled, progress: Progress = lambda _: None) -> None:
+    """Estimate the error of a finished run from a coarser one, and note it in `coupled`; NaN where that one fails."""
+    scenario = coupled.scenario
+    coarse = coarser(scenario) if scenario.simulation.estimate == "richardson" else None
+    if coupled.log.error is not None or coarse is None:
+        return
+    try:
+        other = run(coarse, progress)
+    except RunError:
+        found: dict[str, float] = {}
+    else:
+        p = order(scenario, coupled.exchange)
+        found = {} if other.log.error is not None else estimated_error(coupled.table, other.table, p)
+    signals = [name for name in scenario.simulation.tolerances if name in coupled.table]
+    coupled.estimated_error = {name: found.get(name, float("nan")) for name in signals}
+
+
 def _simulated(scenario: Scenario, graph: Graph, progress: Progress) -> Log:
     simulation = scenario.simulation
     with interruptible() as check:
@@ -231,7 +252,7 @@ def recorded(graph: Graph) -> list[str]:
         f"{component}.{name}"
         for component, fmu in graph.components.items()
         for name, port in fmu.ports.items()
-        if port.causality == "output" and port.kind != "string" and not _only_couples(name, contacts)
+        if port.causality == "output" and port.is_number and not _only_couples(name, contacts)
     ]
 
 
@@ -330,6 +351,8 @@ def summary(coupled: Coupled) -> dict[str, Any]:
         "left_the_groove": coupled.fallen,
         "energy": energy_content(coupled),
         "interface_work_J": {name: float(work[-1]) for name, work in log.energy.items()},
+        "energy_residual_J": {name: float(np.max(np.abs(r))) for name, r in log.energy_residual.items()},
+        "estimated_error": coupled.estimated_error,
         "interface_balance": landing.interface_balance(coupled.table, log.energy),
         "extremes": {n: _extremes(log.time, values) for n, values in coupled.table.items() if n != "time"},
     }
@@ -391,6 +414,8 @@ def write_comparison(directory: RunDirectory, comparison: Comparison, runs: list
         directory.write_fields("reference.h5", reference.fields, FIELD_UNITS)
     for coupled in runs:
         write(RunDirectory(directory.path / coupled.label), coupled, reference)
+    if comparison.reference_energy is not None:
+        directory.write_json("reference.json", {"energy": comparison.reference_energy.content()})
     directory.write_json("comparison.json", comparison.content())
     draw_comparison(directory.path, comparison, [coupled.record for coupled in runs])
     error = "; ".join(failures) or None

@@ -33,6 +33,8 @@ KINDS: dict[str, str] = {
     "Float32": "real",
     "Boolean": "boolean",
     "String": "string",
+    "Binary": "binary",
+    "Clock": "clock",
 }
 Value = float | int | bool | str
 State = c_void_p
@@ -69,7 +71,7 @@ class Port:
     name: str
     vr: int
     unit: str
-    kind: Literal["real", "integer", "boolean", "string"]
+    kind: Literal["real", "integer", "boolean", "string", "binary", "clock"]
     causality: str
     variability: str
     start: str | None
@@ -77,6 +79,11 @@ class Port:
     variable: str
     size: int = 1
     element: int = 0
+
+    @property
+    def is_number(self) -> bool:
+        """Whether it has a place among numbers."""
+        return self.kind in ("real", "integer", "boolean")
 
 
 @dataclass(frozen=True)
@@ -194,8 +201,9 @@ class Group:
         picks = {
             kind: np.array([i for i, p in enumerate(ports) if p.fmi_type == kind], dtype=np.intp) for kind in types
         }
-        if "String" in types:
-            raise ValueError(f"{fmu.name}: {ports[picks['String'][0]].name} is a string and has no place among numbers")
+        for port in ports:
+            if not port.is_number:
+                raise ValueError(f"{fmu.name}: {port.name} is a {port.kind} and has no place among numbers")
         self.runs = [_Run(fmu, kind, [ports[i] for i in pick], pick, self.values) for kind, pick in picks.items()]
 
         # one direct run is the common case: its call is used as it is

@@ -199,6 +199,25 @@ def convergence(path: Path, comparison: Comparison) -> None:
         figure.legend(handles, labels, loc="outside upper center", ncols=min(4, len(labels)))
 
 
+def work_precision(path: Path, comparison: Comparison) -> None:
+    """Draw the relative error of all masters over wall time and over cable solves; a line joins the macro steps."""
+    masters, signals = list(dict.fromkeys(run.master for run in comparison.runs)), list(comparison.tolerance)
+    with _figure(path, (6.6, 2.9 * len(signals) + 0.6)) as figure:
+        axes = figure.subplots(len(signals), 2, sharex="col", sharey="row", squeeze=False)
+        for row, signal in zip(axes, signals, strict=True):
+            for i, master in enumerate(masters):
+                style = {"color": COLOURS[i % 6], "marker": MARKERS[(i + i // 6) % 6], "label": master}
+                runs = sorted((r for r in comparison.runs if r.master == master), key=lambda r: r.macro_step)
+                runs = [r for r in runs if signal in r.signals and np.isfinite(r.signals[signal].relative_max_error)]
+                values = _above_zero(np.array([r.signals[signal].relative_max_error for r in runs]))
+                row[0].loglog([r.wall_s for r in runs], values, markersize=4.5, **style)
+                row[1].loglog([r.cable_steps for r in runs], values, markersize=4.5, **style)
+            row[0].set_ylabel(f"Relative error, {_words(signal)} [–]")
+        axes[-1][0].set_xlabel("Wall time [s]")
+        axes[-1][1].set_xlabel("Cable solves [–]")
+        figure.legend(*axes[0][0].get_legend_handles_labels(), loc="outside upper center", ncols=min(4, len(masters)))
+
+
 def _words(signal: str) -> str:
     """Return what a panel calls `signal`, or its own name."""
     return next((panel.label for panel in LANDING if panel.signal == signal), signal)

@@ -79,6 +79,8 @@ def draw_comparison(directory: Path, comparison: Comparison, records: Sequence[R
         plots.shapes(folder / "shapes.png", records[0].fields, records[0].table)
     if len({run.macro_step for run in comparison.runs}) > 1 and signals:
         plots.convergence(folder / "convergence.png", comparison)
+    if len(comparison.runs) > 1 and signals:
+        plots.work_precision(folder / "work_precision.png", comparison)
 
 
 def report(directory: Path) -> Path:

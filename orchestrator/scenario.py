@@ -54,13 +54,17 @@ NonNegative = Annotated[float, Field(ge=0.0)]
 
 
 class Simulation(Section):
-    """Times in s. `tolerances`: the largest `relative_max_error` that `compare` lets pass, by signal."""
+    """Times in s. `tolerances`: the largest `relative_max_error` that `compare` lets pass, by signal.
+
+    `estimate`: whether and how `run` estimates the error of those signals (docs/estimate.md).
+    """
 
     stop_time: Positive
     macro_step: Positive
     master: str = DEFAULT_MASTER
     exchange: Literal["point", "hermite", "waveform"] | None = None
     tolerances: dict[str, Positive] = {}
+    estimate: Literal["richardson", "none"] = "richardson"
 
 
 class CableSection(Section):

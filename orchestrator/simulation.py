@@ -29,7 +29,9 @@ class Log:
     wall, wall_first : s, the loop without its first step; that step, with all it compiles
     wall_components, solves : seconds inside each FMU's steps and their number, both without the first macro
         step
-    energy : input → work done on the component through it, accumulated, (n + 1,) J
+    energy : load → work done on the component through it, accumulated, (n + 1,) J
+    energy_residual : load → that work less what the component at its other end has booked, accumulated, (n + 1,) J; see
+        `Work`
     error : None if the run came to its end
     """
 
@@ -44,11 +46,17 @@ class Log:
     wall_components: dict[str, float] = field(default_factory=dict)
     solves: dict[str, int] = field(default_factory=dict)
     energy: dict[str, np.ndarray] = field(default_factory=dict)
+    energy_residual: dict[str, np.ndarray] = field(default_factory=dict)
     error: FmuError | None = None
 
     def signal(self, name: str) -> np.ndarray:
         """Return one signal over time, (n + 1,)."""
         return self.values[:, self.signals.index(name)]
+
+    @property
+    def power_residual(self) -> dict[str, np.ndarray]:
+        """Load → difference of the powers on both sides of the interface in each macro step, (n,) W."""
+        return {name: np.diff(values) / self.macro_step for name, values in self.energy_residual.items()}
 
     @property
     def unconverged(self) -> int:
@@ -101,7 +109,7 @@ def _all_outputs(graph: Graph) -> list[str]:
         f"{component}.{port.name}"
         for component, fmu in graph.components.items()
         for port in fmu.ports.values()
-        if port.causality == "output" and port.kind != "string"
+        if port.causality == "output" and port.is_number
     ]
 
 
@@ -173,6 +181,7 @@ class _Run:
         self.failure: BaseException | None = None
         self.work = Work(graph)
         self.energy = np.zeros((log.time.size, len(self.work.names)))
+        self.residual = np.zeros_like(self.energy)
 
     def __call__(self, start: float, stop: float) -> None:
         try:
@@ -194,6 +203,7 @@ class _Run:
         if self.work.names:
             self.work.start()
             self.graph.observers.append(self.work)
+            self.residual[0] = self.work.residual
         self.recorder.read(self.log.values[0])
         self.rows = 1
 
@@ -208,7 +218,8 @@ class _Run:
             self.recorder.read(log.values[i + 1])
             log.steps.append(report)
             if book:
-                self.energy[i + 1] = self.work.total
+                self.energy[i + 1], self.residual[i + 1] = self.work.total, self.work.residual
+                report.power_residual = _largest(self.residual[i + 1] - self.residual[i]) / H
             self.rows = i + 2
             if self.on_step is not None:
                 self.on_step(report)
@@ -224,10 +235,18 @@ class _Run:
         log, n = self.log, self.rows
         log.time, log.values, log.steps = log.time[:n], log.values[:n], log.steps[: max(n - 1, 0)]
         log.energy = dict(zip(self.work.names, self.energy[:n].T, strict=True))
+        booked = [i for i, name in enumerate(self.work.names) if not np.isnan(self.residual[:1, i]).any()]
+        log.energy_residual = {self.work.names[i]: self.residual[:n, i] for i in booked}
         first = getattr(self, "_first", {})
         for name, fmu in self.graph.components.items():
             wall, solves = first.get(name, (0.0, 0))
             log.wall_components[name], log.solves[name] = fmu.wall - wall, fmu.solves - solves
+
+
+def _largest(energies: np.ndarray) -> float:
+    """Return the largest magnitude of those that are booked, nan if none is."""
+    booked = energies[~np.isnan(energies)]
+    return float(np.max(np.abs(booked))) if booked.size else np.nan
 
 
 def _watched(run: _Run, start: float, stop: float, timeout: float) -> None:

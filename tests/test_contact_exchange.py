@@ -94,9 +94,7 @@ def test_work_booked_is_the_work_of_the_law(seed):
     start, inputs = random_inputs(np.random.default_rng(seed))
     _, weights, motions, samples, *_ = sampled(contact, start, inputs, h)
     w = h * weights
-    law_wheel = w @ np.sum(
-        samples[:8, 6:9] * motions[:8, 18:21] + samples[:8, 9:12] * motions[:8, 21:24], axis=1
-    )
+    law_wheel = w @ np.sum(samples[:8, 6:9] * motions[:8, 18:21] + samples[:8, 9:12] * motions[:8, 21:24], axis=1)
     turn = np.cross(motions[:8, 3:6], motions[:8, 9:12]) / np.sum(motions[:8, 3:6] ** 2, axis=1)[:, None]
     law_push = w @ np.sum(samples[:8, 0:3] * motions[:8, 6:9], axis=1)
     law_turn = w @ np.sum(samples[:8, 3:6] * turn, axis=1)

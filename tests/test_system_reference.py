@@ -29,7 +29,9 @@ class Independent:
         self.robot = body_parameters(robot.values, robot.table)
         self.contact = law_parameters(contact.values, contact.table)
         self.s = float(contact.values[contact.table.index["initial.s"]])
-        self.start = np.concatenate([cable.state[: 2 * self.n], initial_state(robot.values, robot.table)[:13], np.zeros(2)])
+        self.start = np.concatenate(
+            [cable.state[: 2 * self.n], initial_state(robot.values, robot.table)[:13], np.zeros(2)]
+        )
         self.mass = self._mass_matrix()
 
     def _mass_matrix(self):

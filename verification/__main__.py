@@ -14,7 +14,11 @@ import matplotlib
 
 from verification.study import page_section
 
+<<<<<<< HEAD
 SECTIONS = {"cable": "Cable", "exchange": "Exchange within a macro step", "system": "Whole system"}
+=======
+SECTIONS = {"cable": "Cable", "coupling": "Coupling"}
+>>>>>>> h/estimate
 """Package below `verification` → heading, in the order of the page."""
 ROOT = Path(__file__).resolve().parent.parent
 PAGE = ROOT / "docs" / "verification.md"

@@ -173,7 +173,7 @@ def _same_key(key, q, v, h):
     n = q.size
     if key[2 * n] != h:
         return False
-    for i in range(n):  # noqa: SIM110
+    for i in range(n):
         if key[i] != q[i] or key[n + i] != v[i]:
             return False
     return True
@@ -372,20 +372,22 @@ def port_motion(model, state, s, shape, out):
 
 
 @kernel
-def macro_step(model, collocation, alpha, use_alpha, state, h, longest, ports, means, work):
-    """Advance `state` by the macro step `h` with inner steps of at most `longest`.
+def macro_step(model, collocation, alpha, use_alpha, state, h, longest, ports, shown, out, rows, work):
+    """Advance `state` by the macro step `h` with inner steps of at most `longest`, and write all outputs.
 
     An inner step that does not converge is repeated at half its length, up to MAX_HALVINGS times.
 
     Parameters
     ----------
     ports : (N_PORTS, 13), see `collocation_step`
-    means : (N_PORTS, 6), receives the time means of position and tangent over the macro step: over each inner
-        step (x0 + x1)/2 + h/12 (x0' - x1'), the mean of the cubic through its ends
+    shown : (N_PORTS, 19), receives what `show_ports` writes, then the time means of position and tangent over the macro
+        step (over each inner step (x0 + x1)/2 + h/12 (x0' - x1'), the mean of the cubic through its ends) and the work
+    out, rows : see `diagnose`
     """
     n = model.weight.size
     sums = state[4 * n :]
     tolerance = CONVERGED * max(1.0, model.s[-1] / 200.0)
+    means = work.means
     means[:, :] = 0.0
     first = work.first
     for k in range(N_PORTS):
@@ -439,6 +441,12 @@ def macro_step(model, collocation, alpha, use_alpha, state, h, longest, ports, m
             end = work.start[k, i]
             sums[WORK + k] += force * (end - first[k, i]) + rate * h * (0.5 * (first[k, i] + end) - means[k, i])
     sums[LAST_MACRO] = h
+    show_ports(model, state, ports, shown, work)
+    for k in range(N_PORTS):
+        for i in range(6):
+            shown[k, 12 + i] = means[k, i]
+        shown[k, 18] = sums[WORK + k]
+    diagnose(model, collocation, use_alpha, state, ports, out, rows, work)
     return OK
 
 
@@ -458,21 +466,6 @@ def show_ports(model, state, ports, shown, work):
     for k in range(N_PORTS):
         port_motion(model, state, ports[k, 0], work.shape, shown[k, 0:12])
         curvature(model, state[:n], ports[k, 0], work.shape, shown[k, 19:22])
-
-
-@kernel
-def step_and_show(model, collocation, alpha, use_alpha, state, h, longest, ports, shown, out, rows, work):
-    """Make a macro step and write all outputs: `macro_step`, `show_ports` and `diagnose` in one call."""
-    status = macro_step(model, collocation, alpha, use_alpha, state, h, longest, ports, work.means, work)
-    if status != OK:
-        return status
-    show_ports(model, state, ports, shown, work)
-    for k in range(N_PORTS):
-        for i in range(6):
-            shown[k, 12 + i] = work.means[k, i]
-        shown[k, 18] = state[4 * model.weight.size + WORK + k]
-    diagnose(model, collocation, use_alpha, state, ports, out, rows, work)
-    return OK
 
 
 @kernel

@@ -221,7 +221,7 @@ class Cable:
                 f"cable: port[{k + 1}].s = {self._ports[k, 0]:g} m is off the cable (0 to {self.model.s[-1]:g} m) at "
                 f"t = {t:g} s: the wheel has run past a support; stop the run earlier, or brake the robot"
             )
-        status = dynamics.step_and_show(
+        status = dynamics.macro_step(
             self.model,
             self._collocation,
             self._alpha,

@@ -149,7 +149,7 @@ class Contact:
 
     def initialize(self, t: float) -> None:
         """Take over parameters and inputs; the bristle is relaxed, the outputs are the law's now."""
-        self._check_parameters()
+        self.check_parameters()
         self._prm = law_parameters(self.values, self.table)
         self._method = int(self._value("exchange"))
         self._nodes, self._weights, self._increments = exchange.gauss_rule(SAMPLES)
@@ -199,7 +199,8 @@ class Contact:
     def _value(self, name: str) -> float:
         return float(self.values[self.table.index[name]])
 
-    def _check_parameters(self) -> None:
+    def check_parameters(self) -> None:
+        """Raise `ModuleError` naming the first parameter that makes no sense."""
         for name in (*_POSITIVE, *_NOT_NEGATIVE, "initial.s"):
             value = self._value(name)
             if not math.isfinite(value):

@@ -27,7 +27,7 @@ class StepReport:
     columns : least-squares columns kept, 0 where there are none
     converged : False if any part of it did not reach the tolerance
     estimate : a-posteriori error estimate, nan where none is made
-    power_residual : W, difference of the powers on both sides of the interfaces, nan where it is not booked
+    power_residual : W, largest difference of the powers on both sides of an interface, nan where none is booked
     """
 
     time: float

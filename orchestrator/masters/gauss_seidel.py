@@ -52,7 +52,7 @@ class GaussSeidel(Master):
             if node.forward.size:
                 node.receive(graph.y)
             step_node(between, node, t, H)
+        graph.refresh()
         if graph.observers:
             graph.accepted(t, H)
-        graph.refresh()
         return StepReport(t + H)

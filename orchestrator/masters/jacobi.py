@@ -58,10 +58,10 @@ class Jacobi(Master):
             if node.rates.names:
                 node.rates.set()
             node.fmu.step(t, H)
-        if graph.observers:
-            graph.acted[:] = graph.u
-            graph.accepted(t, H)
+        graph.acted[:] = graph.u
         graph.refresh()
+        if graph.observers:
+            graph.accepted(t, H)
 
 
 def extrapolate(graph: Graph, loads: Loads, history: History, t: float, H: float) -> None:

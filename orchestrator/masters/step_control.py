@@ -1,4 +1,4 @@
-"""Error control inside a macro step: step doubling by rollback, sub-steps of H/2^k."""
+"""Error control inside a macro step: step doubling by rollback, a PI controller, sub-steps of H/2^k."""
 
 from __future__ import annotations
 
@@ -15,7 +15,10 @@ if TYPE_CHECKING:
     from orchestrator.masters.implicit import Implicit
 
 ORDER = 4  # of the `waveform` exchange; a local error of order 5
-SAFETY = 0.25  # a step is made longer when its error would stay below this share of the tolerance
+SAFETY = 0.5  # the controller aims at this share of the tolerance
+PROPORTIONAL, INTEGRAL = 0.4 / (ORDER + 1), 0.7 / (ORDER + 1)  # Hairer & Wanner 1996, IV.2, eq. (2.43c)
+SHORTEST, LONGEST = 0.2, 5.0  # change of the length from one sub-step to the next
+SMALLEST = 1e-4  # an error below this share of what is aimed at says no more
 
 
 # outputs that say something about the step, not about its end
@@ -26,10 +29,13 @@ class StepControl:
     """Advances a macro step in sub-steps whose local error is below a tolerance.
 
     Each sub-step h is made once as a whole and once in two halves; the difference of the motions, times 2^p/(2^p - 1)
-    with p = 4, estimates the local error of the whole, and the halves are kept. Too large: rolled back, h halved. Small
-    enough: h doubled, at most to the macro step, so that whoever records sees the same times as ever. The lengths are
-    the macro step over powers of two because Jacobians and columns serve one length each. (With lengths so coarse a PI
-    controller has nothing to smooth.)
+    with p = 4, estimates the local error of the whole, and the halves are kept. Too large an error: all is rolled back
+    and h shortened. Otherwise a PI controller changes the length that is wanted, shorter or longer, by
+    (S tol/e)^a (e before/S tol)^b, with e the error taken from h to that length by its fifth power.
+
+    Communication with whoever records stays at the fixed macro steps; they are the longest sub-steps too, so a large
+    macro step and a tolerance make the steps adaptive. What is wanted is rounded down to H/2^k, because Jacobians and
+    columns serve one length each.
 
     Parameters
     ----------
@@ -46,30 +52,41 @@ class StepControl:
 
     def start(self) -> None:
         """Begin with whole macro steps."""
-        self.level = 0
+        self.wanted, self.last = np.inf, 1.0  # s, and e / (S tol) of the last sub-step
         self.range.start()
 
     def advance(self, t: float, H: float, report: StepReport) -> None:
         """Advance by the macro step `H`."""
         done, whole, worst = 0, 2**self.deepest, 0.0
         while done < whole:
-            length = whole >> self.level
-            if done % length:  # a longer step must begin where one of its length would
-                self.level += 1
-                continue
+            length = self._length(done, whole, H)
             h = H * length / whole
-            error = self._attempt(t + H * done / whole, h, report)
-            if error > self.tolerance and self.level < self.deepest:
-                self.level += 1
+            error = self._attempt(t + H * done / whole, h, report, last=length == 1)
+            accepted = error <= self.tolerance or length == 1
+            if not accepted:
+                self.wanted = h * min((error / (SAFETY * self.tolerance)) ** (-1.0 / (ORDER + 1)), 0.5)
                 report.subdivisions += 1
                 continue
+            self.wanted = self._controlled(min(self.wanted, H), h, error)
             worst = max(worst, error)
             done += length
-            if error < SAFETY * self.tolerance / 2 ** (ORDER + 1) and self.level > 0:
-                self.level -= 1
         report.estimate = worst
 
-    def _attempt(self, t: float, h: float, report: StepReport) -> float:
+    def _length(self, done: int, whole: int, H: float) -> int:
+        """Return the longest H/2^k within what is wanted that begins where one of its length would, in H/2^deepest."""
+        length = whole
+        while length > 1 and (done % length or H * length / whole > self.wanted * (1.0 + 1e-9)):
+            length //= 2
+        return length
+
+    def _controlled(self, wanted: float, h: float, error: float) -> float:
+        """Return the length wanted next, s, after a sub-step `h` has been accepted with `error`."""
+        ratio = max(error / (SAFETY * self.tolerance) * (wanted / h) ** (ORDER + 1), SMALLEST)
+        factor = ratio**-INTEGRAL * self.last**PROPORTIONAL
+        self.last = ratio
+        return wanted * float(np.clip(factor, SHORTEST, LONGEST))
+
+    def _attempt(self, t: float, h: float, report: StepReport, *, last: bool) -> float:
         """Make the step whole, then in halves; return the error. If it is too large, all is as before."""
         master = self.master
         before = master.snapshot()
@@ -80,7 +97,7 @@ class StepControl:
             master.advance(t, h / 2, 0, report)
             master.advance(t + h / 2, h / 2, 0, report)
             error = self.range.norm(coarse - master.graph.y) * 2**ORDER / (2**ORDER - 1)
-            if error > self.tolerance and self.level < self.deepest:
+            if error > self.tolerance and not last:
                 master.revert(before)
             else:
                 self.range.update()

@@ -129,7 +129,7 @@ def oscillator_solution(
     return np.array([(expm(A * t) @ z0)[[0, 2]] for t in time])
 
 
-def chain(n: int, *, waveform: bool, stiffness: float = 200.0) -> Graph:
+def chain(n: int, *, waveform: bool, stiffness: float = 200.0, damping: float = 0.0) -> Graph:
     """Return `n` equal masses, each coupled to its left neighbour by a spring; the first one starts
     displaced."""
     components, connections = {}, []
@@ -140,6 +140,7 @@ def chain(n: int, *, waveform: bool, stiffness: float = 200.0) -> Graph:
             mass=1.0,
             ground_stiffness=10.0,
             stiffness=stiffness if i else 0.0,
+            damping=damping if i else 0.0,
             initial_position=0.0 if i else 0.1,
         )
     for i in range(1, n):
@@ -154,12 +155,11 @@ def chain(n: int, *, waveform: bool, stiffness: float = 200.0) -> Graph:
     return Graph(components, connections)
 
 
-def chain_solution(time: np.ndarray, n: int, stiffness: float = 200.0) -> np.ndarray:
+def chain_solution(time: np.ndarray, n: int, stiffness: float = 200.0, damping: float = 0.0) -> np.ndarray:
     """Return the positions of the chain, (len(time), n), from the matrix exponential."""
-    K = 10.0 * np.eye(n)
-    for i in range(1, n):
-        K[i - 1 : i + 1, i - 1 : i + 1] += stiffness * np.array([[1.0, -1.0], [-1.0, 1.0]])
-    A = np.block([[np.zeros((n, n)), np.eye(n)], [-K, np.zeros((n, n))]])
+    difference = np.diff(np.eye(n), axis=0)
+    K, C = 10.0 * np.eye(n) + stiffness * difference.T @ difference, damping * difference.T @ difference
+    A = np.block([[np.zeros((n, n)), np.eye(n)], [-K, -C]])
     z0 = np.zeros(2 * n)
     z0[0] = 0.1
     return np.array([(expm(A * t) @ z0)[:n] for t in time])

@@ -20,7 +20,7 @@ from dataclasses import dataclass
 import numpy as np
 from scipy.integrate import solve_bvp, solve_ivp
 from scipy.linalg import eigh
-from scipy.optimize import brentq, root
+from scipy.optimize import root, root_scalar
 
 TOLERANCE = 1e-9
 """Relative residual left by `solve_bvp`."""
@@ -93,7 +93,8 @@ class Shape:
 def chord_tension(beam: Beam, chord: float, extra: float = 0.0) -> float:
     """Return the tension of the flat parabola: H/EA = chord/L - 1 + (W/H)²/24, W with `extra` load (Irvine 1981)."""
     w = beam.weight * beam.length + extra
-    return brentq(lambda t: t / beam.ea - (chord / beam.length - 1.0) - (w / t) ** 2 / 24.0, 1e-6 * w, beam.ea + 10 * w)
+    bracket = (1e-6 * w, beam.ea + 10.0 * w)
+    return root_scalar(lambda t: t / beam.ea - (chord / beam.length - 1.0) - (w / t) ** 2 / 24.0, bracket=bracket).root
 
 
 def equilibrium(

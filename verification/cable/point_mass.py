@@ -108,7 +108,7 @@ def talbot(transform: Callable[[np.ndarray], np.ndarray], times: np.ndarray, n: 
     theta = (2.0 * np.arange(n) + 1.0) * np.pi / n - np.pi
     z = n * (0.5017 * theta / np.tan(0.6407 * theta) - 0.6122 + 0.2645j * theta)
     dz = n * (0.5017 / np.tan(0.6407 * theta) - 0.5017 * 0.6407 * theta / np.sin(0.6407 * theta) ** 2 + 0.2645j)
-    return np.array([(np.exp(z) * transform(z / t) * dz).sum() / (1j * n * t) for t in times]).real
+    return np.real([(np.exp(z) * transform(z / t) * dz).sum() / (1j * n * t) for t in times])
 
 
 def impact_height(theory: Taut, v0: float, times: np.ndarray) -> np.ndarray:

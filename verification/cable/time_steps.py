@@ -181,7 +181,9 @@ def _draw(path: Path, times: np.ndarray, history: np.ndarray) -> None:
         for method, colour in zip(METHODS, COLOURS, strict=False):
             steps, errors, _ = order(method, (16, 32, 64, 128))
             left.loglog(steps, errors, "o-", markersize=4, color=colour, label=method)
-        left.set_xlabel("Inner step, s")
+        left.set_xticks(steps, [f"{1e3 * h:g}" for h in steps], minor=False)
+        left.minorticks_off()
+        left.set_xlabel("Inner step, ms")
         left.set_ylabel("Error of a coordinate, m")
         left.legend(fontsize=6.5)
         for k, name in enumerate(("kinetic", "elastic", "gravitational", "dissipated")):

@@ -1,0 +1,68 @@
+"""The error of a coupled run, estimated without a reference: the run is repeated with everything coarser.
+
+Macro step and inner steps are doubled and the tolerances of the iteration raised, so that each of the errors grows; the
+largest difference between both runs over (2^p - 1) then estimates the error of the finer one (Richardson's rule). p is
+not measured by a third run: on the landings that predicts worse (docs/estimate.md).
+"""
+
+from __future__ import annotations
+
+from collections.abc import Iterator
+
+import numpy as np
+
+from orchestrator import vocabulary
+from orchestrator.masters import MASTERS
+from orchestrator.results import Table
+from orchestrator.scenario import CableSection, Component, RobotSection, Scenario
+
+RAISED = {"tolerance": 10.0, "local_tolerance": 32.0}
+"""By this the master's tolerances are multiplied: the error of the iteration grows about as much as that of the step, a
+local error of order 5 as by doubled sub-steps."""
+INNER_STEP = "integration_step"
+
+
+def order(scenario: Scenario, exchange: str) -> int:
+    """Return p.
+
+    `waveform` has order 4 where the motion is smooth and about 2 where touch, lift-off or slip falls inside a step: 3.
+    Other implicit coupling holds values at an instant: 2. Explicit coupling: 1, that is, the difference as it is.
+    """
+    if not MASTERS[scenario.simulation.master].IMPLICIT:
+        return 1
+    return 3 if exchange == "waveform" else 2
+
+
+def coarser(scenario: Scenario) -> Scenario | None:
+    """Return the scenario with everything coarser; None if it has fewer than four macro steps."""
+    simulation = scenario.simulation
+    count, doubled = round(simulation.stop_time / simulation.macro_step), 2.0 * simulation.macro_step
+    if count < 4:
+        return None
+    copy = scenario.changed(macro_step=doubled, stop_time=(count // 2) * doubled)
+    for section, step in _inner_steps(copy):
+        section.parameters[INNER_STEP] = 2.0 * step
+    options = vocabulary.masters()[simulation.master] | copy.master
+    copy.master.update({name: factor * options[name] for name, factor in RAISED.items() if options.get(name)})
+    return copy
+
+
+def _inner_steps(scenario: Scenario) -> Iterator[tuple[CableSection | RobotSection | Component, float]]:
+    """Yield the sections of all components that have an inner step, and that step, s."""
+    ours: dict[str, CableSection | RobotSection | None] = {"cable": scenario.cable, "robot": scenario.robot}
+    for section in (*ours.values(), *scenario.components.values()):
+        if section is not None and INNER_STEP in section.parameters:
+            yield section, float(section.parameters[INNER_STEP])
+    for name, section in ours.items():
+        if section is not None and section.fmu is None and INNER_STEP not in section.parameters:
+            yield section, float(vocabulary.of_module(name)[INNER_STEP].start)
+
+
+def estimated_error(fine: Table, coarse: Table, p: int) -> dict[str, float]:
+    """Return the estimated largest error of every signal of `fine`, in its unit; every other row is in `coarse`."""
+    rows = slice(0, 2 * len(coarse["time"]) - 1, 2)
+    return {
+        name: float(np.max(np.abs(values[rows] - coarse[name]))) / (2**p - 1)
+        for name, values in fine.items()
+        if name in coarse and name != "time"
+    }

@@ -1,0 +1,110 @@
+"""Power residual of the interfaces, error estimate of a run, step control.
+
+Expected values: conservation of energy (test FMUs are exact inside a step), the matrix exponential, definitions.
+"""
+
+from __future__ import annotations
+
+import numpy as np
+import pytest
+
+from orchestrator.graph import Connection, Graph
+from orchestrator.masters.step_control import SAFETY, StepControl
+from orchestrator.simulation import Log
+from tests.fmus import fmu
+from tests.test_masters import ITERATED, run
+
+RECORD = ["a.position", "a.velocity", "b.position", "b.velocity"]
+
+
+def spring_between(master: str, H: float, **options) -> Log:
+    """Two masses, 1 kg and 2 kg (the second on 100 N/m), and a linear spring between, nothing damped."""
+    a = fmu("link", "a", mass=1.0, initial_position=0.1)
+    b = fmu("link", "b", mass=2.0, ground_stiffness=100.0)
+    s = fmu("spring", "s", stiffness=1e3, exponent=1.0, two_sided=1.0)
+    pairs = []
+    for side in "ab":
+        pairs += [(f"{side}.{v}", f"s.{side}.{v}") for v in ("position", "position_mean")]
+        pairs += [(f"s.{side}.{v}", f"{side}.{v}") for v in ("force", "force_rate")]
+    return run(Graph({"a": a, "b": b, "s": s}, [Connection(*p) for p in pairs]), master, H, 0.5, RECORD, **options)
+
+
+def energy(log: Log) -> np.ndarray:
+    xa, va, xb, vb = log.values.T
+    return 0.5 * va**2 + vb**2 + 50.0 * xb**2 + 500.0 * (xa - xb) ** 2
+
+
+@pytest.mark.parametrize(("master", "H"), [("gauss_seidel", 0.005), ("gauss_seidel", 0.001), ("iqn_ils", 0.02)])
+def test_energy_residual_is_the_energy_the_coupling_makes(master, H):
+    """Masses take what is booked on them, the spring stores what it books itself: the rest is the sum's drift."""
+    log = spring_between(master, H)
+    made = energy(log) - energy(log)[0]
+    residual = sum(log.energy_residual.values())
+    assert list(log.energy_residual) == ["a.force", "b.force"]
+    assert residual == pytest.approx(made, abs=1e-12)
+    if master == "gauss_seidel":
+        assert np.max(np.abs(made)) > 1e-4
+
+
+def test_power_residual_is_reported_for_every_step():
+    log = spring_between("gauss_seidel", 0.005)
+    largest = np.max(np.abs(list(log.power_residual.values())), axis=0)
+    assert [step.power_residual for step in log.steps] == pytest.approx(largest)
+    assert np.max(largest) == pytest.approx(np.max(np.abs(np.diff(list(log.energy_residual.values())))) / 0.005)
+
+
+@pytest.mark.parametrize("master", ITERATED)
+def test_power_residual_of_a_converged_step_is_the_tolerance_s(master):
+    """Residual relative to the largest load, 105 N, times tolerance, at speeds below 3.2 m/s; two sides."""
+    log = spring_between(master, 0.01, tolerance=1e-9)
+    assert max(step.power_residual for step in log.steps) < 2e-9 * 105.0 * 3.2
+
+
+def test_rejected_sub_steps_leave_no_residual():
+    log = spring_between("iqn_ils", 0.05, local_tolerance=1e-6, tolerance=1e-12)
+    assert sum(step.subdivisions for step in log.steps) > 0
+    assert sum(log.energy_residual.values()) == pytest.approx(energy(log) - energy(log)[0], abs=1e-9)
+
+
+def test_not_booked_where_the_giver_is_not_told_the_motion():
+    a, b = fmu("link", "a", mass=1.0), fmu("link", "b", mass=1.0, stiffness=10.0, initial_position=0.1)
+    log = run(Graph({"a": a, "b": b}, [Connection("b.left.force", "a.force")]), "jacobi", 0.01, 0.1)
+    assert log.energy_residual == {} and np.isnan(log.steps[-1].power_residual)
+
+
+def controlled(master: str = "iqn_ils", **options) -> Log:
+    return spring_between(master, 0.1, tolerance=1e-10, absolute=1e-6, **options)
+
+
+@pytest.mark.parametrize("master", ["iqn_ils", "interface_jacobian"])
+def test_adaptive_error_follows_the_tolerance(master):
+    """Local errors below the tolerance but in the first step, whose range to measure by begins at zero; the global error
+    goes down with the tolerance."""
+    exact = controlled(master, local_tolerance=1e-9).values[:, [0, 2]]
+    errors = []
+    for tolerance in (1e-4, 1e-6):
+        log = controlled(master, local_tolerance=tolerance)
+        assert max(step.estimate for step in log.steps[1:]) <= tolerance
+        errors.append(float(np.max(np.abs(log.values[:, [0, 2]] - exact))))
+    assert errors[1] < 0.1 * errors[0] and errors[0] < 1e-2
+
+
+def test_sub_steps_grow_again():
+    """After a rejection the controller lengthens again: a smooth motion needs the same sub-steps all along."""
+    log = controlled(local_tolerance=1e-6)
+    halves = [step.iterations for step in log.steps]
+    assert log.time == pytest.approx(np.linspace(0.0, 0.5, 6))
+    assert max(halves[1:]) < 2.5 * min(halves[1:])
+    assert sum(step.subdivisions for step in log.steps[1:]) <= 4
+
+
+def test_controller_finds_the_length_that_the_error_allows():
+    """From 1 ms the length wanted grows to what the error allows, where it settles without overshooting much."""
+    control = StepControl.__new__(StepControl)
+    control.tolerance, control.last = 1e-6, 1.0
+    wanted, lengths = 1e-3, []
+    for _ in range(20):  # local error of order five: 1e-6 at 8 ms, 5e-7 is aimed at
+        wanted = control._controlled(wanted, 1e-3, 1e-6 * (1 / 8) ** 5)
+        lengths.append(wanted)
+    assert lengths[-1] == pytest.approx(8e-3 * SAFETY ** (1 / 5), rel=0.02)
+    assert max(lengths) < 1.3 * lengths[-1]
