@@ -46,10 +46,10 @@ def rule(m):
 
 
 def random_inputs(rng, size=1e-3):
-    """A start motion and inputs (42,) that differ from it by about `size`."""
+    """A start motion and inputs (45,) that differ from it by about `size`."""
     start = np.zeros(24)
     start[4], start[14], start[15] = 1.0, SEAT - 3e-3, 1.0
-    inputs = np.zeros(42)
+    inputs = np.zeros(45)
     inputs[:24] = start
     inputs[:24] += size * rng.normal(size=24)
     for j, i in enumerate((0, 1, 2, 3, 4, 5, 12, 13, 14, 15, 16, 17)):
@@ -79,7 +79,9 @@ def sampled(contact, start, inputs, h, m=8):
     exchange.motion_at(path, 1.0, h, end)
     exchange.motion_at(path, 0.0, h, motions[0])
     contact_wrench(contact._prm, motions[0], z, first)
-    status, lost = exchange.sample_law(contact._prm, path, h, nodes, weights, increments, end, z, motions, samples)
+    status, lost = exchange.sample_law(
+        contact._prm, path, h, nodes, weights, increments, end, np.zeros(3), z, motions, samples
+    )
     assert status == 0
     return nodes, weights, motions, samples, lost, first[25] + first[26]
 
@@ -488,7 +490,7 @@ def test_bad_motion_is_named():
 def test_contract_names_are_there():
     """The names other components connect to; vectors by component."""
     for side, names in (
-        ("cable", "position tangent velocity tangent_rate position_mean tangent_mean"),
+        ("cable", "position tangent velocity tangent_rate position_mean tangent_mean curvature"),
         ("wheel", "position axle velocity angular_velocity position_mean axle_mean rotation rotation_mean"),
     ):
         for name in names.split():

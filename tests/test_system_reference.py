@@ -17,9 +17,9 @@ from tests.test_system_energy import scenario
 class Independent:
     """The same physics as one explicit system of differential equations, y' = f(t, y).
 
-    y holds q and v of the cable, the robot's position, quaternion, velocity, angular velocity, and the bristle. It shares
-    the physics with the reference (forces of cable, contact and robot), but neither its time integration, nor its Newton
-    matrix, nor how it couples. Friction must stick, so that the bristle follows ż = slip velocity.
+    y holds q and v of the cable, the robot's position, quaternion, velocity, angular velocity, and the bristle. It
+    shares the physics with the reference (forces of cable, contact and robot), but neither its time integration, nor
+    its Newton matrix, nor how it couples. Friction must stick, so that the bristle follows ż = slip velocity.
     """
 
     def __init__(self, problem):

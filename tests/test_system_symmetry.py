@@ -1,6 +1,6 @@
 """Symmetries of whole runs, coupled and monolithic: what is mirrored or turned moves mirrored or turned.
 
-Tolerances are round-off (1e-16 of 200 m) times what the motion makes grow in the time of a run, measured at 1e3 at most.
+Tolerances are round-off (1e-16 of 200 m) times what the motion makes grow in the time of a run, at most 1e3.
 """
 
 import numpy as np
@@ -14,8 +14,8 @@ from tests.test_system_energy import scenario
 ROUND_OFF = 1e-10
 """m and rad, over 1 s."""
 ITERATION = 1e-7
-"""m and rad: a coupled run iterates to 1e-8 of the largest force, 1e-5 N; on 38 kg (and 5 kg m² at 0.3 m) for 0.5 s that
-is up to 7e-8."""
+"""m and rad: a coupled run iterates to 1e-8 of the largest force, 1e-5 N; on 38 kg (and 5 kg m² at 0.3 m) for 0.5 s
+that is up to 7e-8."""
 
 
 def run(kind, one):

@@ -20,6 +20,7 @@ from fmus.cable.assembly import (
     add_inertia,
     add_load,
     constrain_vector,
+    curvature,
     dot,
     element_work,
     internal_force,
@@ -460,9 +461,11 @@ def mean_axial_force(model, s, axial, shape):
 
 @kernel
 def show_ports(model, state, ports, shown, work):
-    """Write position, tangent, velocity and tangent rate of every port to the rows of `shown` (N_PORTS, 19)."""
+    """Write position, tangent, velocity, tangent rate and d²r/ds² of every port to `shown` (N_PORTS, 22)."""
+    n = model.weight.size
     for k in range(N_PORTS):
         port_motion(model, state, ports[k, 0], work.shape, shown[k, 0:12])
+        curvature(model, state[:n], ports[k, 0], work.shape, shown[k, 19:22])
 
 
 @kernel

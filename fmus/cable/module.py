@@ -82,6 +82,7 @@ def _port(k: int) -> tuple[list[Variable], list[Variable]]:
     outputs += vector(f"{p}.position_mean", "output", "m", f"time mean of position {over}", feedthrough=f)
     outputs += vector(f"{p}.tangent_mean", "output", "1", f"time mean of tangent {over}", feedthrough=f)
     outputs.append(Variable(f"{p}.work", "output", "J", 0.0, "work done on the cable through this port"))
+    outputs += vector(f"{p}.curvature", "output", "1/m", "d²r/ds² there", feedthrough=f)
     return inputs, outputs
 
 
@@ -125,7 +126,7 @@ class Cable:
         self.values = self.table.defaults()
         self.state = np.zeros(0)
         self._ports = self._rows("port[1].s", N_PORTS, 13)
-        self._shown_ports = self._rows("port[1].position.x", N_PORTS, 19)
+        self._shown_ports = self._rows("port[1].position.x", N_PORTS, 22)
         self._shape = self._rows("shape[1].position.x", N_SHAPE, 4)
         self._shown = self._rows("tension_left", 1, 13)[0]
 

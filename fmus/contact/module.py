@@ -80,6 +80,7 @@ def _inputs() -> list[Variable]:
         *rows("wheel.axle_mean", "1", "time mean of the axle over the macro step", across),
         *rows("wheel.rotation", "rad", "integral of the wheel's angular velocity over the macro step"),
         *rows("wheel.rotation_mean", "rad", "time mean of that running integral"),
+        *rows("cable.curvature", "1/m", "d²r/ds² of the cable at cable.s; zero: it counts as straight"),
     ]
 
 
@@ -129,7 +130,7 @@ def _outputs(motion: tuple[str, ...]) -> list[Variable]:
 def _table() -> VariableTable:
     inputs = _inputs()
     names = tuple(v.name for v in inputs)
-    motion = names[:24] + names[36:39]
+    motion = names[:24] + names[36:39] + names[42:45]
     return VariableTable([*_parameters(), *inputs, *_outputs(motion)])
 
 
@@ -139,7 +140,7 @@ class Contact:
     NAME = "contact"
     TITLE = "Hunt-Crossley contact of a grooved wheel with a cable"
     table = _table()
-    _INPUTS = slice(table.index["cable.position.x"], table.index["wheel.rotation_mean.z"] + 1)
+    _INPUTS = slice(table.index["cable.position.x"], table.index["cable.curvature.z"] + 1)
     _OUTPUTS = slice(table.index["cable.force.x"], table.index["work_wheel"] + 1)
 
     def __init__(self) -> None:
@@ -157,6 +158,7 @@ class Contact:
         self._samples = np.zeros((SAMPLES + 1, OUT_SIZE))
         self.state = np.zeros(exchange.STATE_SIZE)
         self.state[exchange.LAST : exchange.LAST + 24] = self.values[self._INPUTS][:24]
+        self.state[exchange.CURVATURE : exchange.CURVATURE + 3] = self.values[self._INPUTS][42:45]
         self.state[exchange.ARC] = self._value("initial.s")
         self.refresh()
         outputs = self.values[self._OUTPUTS]

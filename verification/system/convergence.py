@@ -1,9 +1,9 @@
 """What of the flagship is converged to how many digits: mesh, tolerance of the solver, macro step, contact.
 
 The landing at 20 m over 5 s; each row changes one thing and gives the largest difference in Z and in roll over their
-peak to peak. The discretisation (mesh, tolerance, macro step) has an exact answer, from which the differences are taken:
-240 elements graded 1:240, a hundredth of the tolerance, the monolithic solution. The contact's stiffness and longest
-contact length are assumed: their rows show what the assumption is worth, as a difference from the default.
+peak to peak. The discretisation (mesh, tolerance, macro step) has an exact answer, from which the differences are
+taken: 240 elements graded 1:240, a hundredth of the tolerance, the monolithic solution. The contact's stiffness and
+longest contact length are assumed: their rows show what the assumption is worth, as a difference from the default.
 """
 
 from __future__ import annotations

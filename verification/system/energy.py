@@ -1,4 +1,4 @@
-"""The first law over whole runs: kinetic, elastic and gravitational energy, what is dissipated, less the control's work.
+"""The first law over whole runs: kinetic, elastic, gravitational and dissipated energy, less the control's work.
 
 The drift of the sum over the energy exchanged (half the sum of all changes, at its largest). Coupled runs must keep it
 below 1e-6 of the energy exchanged at H = 5 ms in a landing without impact, and below 1e-5 with one; what remains is the
