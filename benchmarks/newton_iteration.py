@@ -13,9 +13,10 @@ import numpy as np
 
 from fmus import banded
 from fmus.cable import dynamics
-from fmus.cable.assembly import constrain_vector, iteration_matrix
+from fmus.cable.assembly import Model, constrain_vector, iteration_matrix
 from fmus.cable.module import Cable
 from fmus.jit import kernel
+from fmus.variables import Value
 
 REPEAT, NUMBER = 20, 500
 TARGET = 15.0
@@ -23,7 +24,7 @@ TARGET = 15.0
 
 
 @kernel
-def _residuals(model, q, v, work, number):
+def residuals(model, q, v, work, number):
     """Evaluate the residual of one stage a number of times."""
     for _ in range(number):
         dynamics.residual(model, q, v, work.a[0], work.external, work.residual[0], work.axial, work.element)
@@ -31,7 +32,7 @@ def _residuals(model, q, v, work, number):
 
 
 @kernel
-def _solutions(band, x, number):
+def solutions(band, x, number):
     """Solve a number of times."""
     for _ in range(number):
         for i in range(x.size):
@@ -61,13 +62,40 @@ def main() -> None:
     iteration_matrix(model, q, v, 1.0 + 0.0j, z, z * z, work.band, work.matrix, work.element)
     banded.factorise(work.real_band)
     banded.factorise(work.band)
-    residual = microseconds(lambda: _residuals(model, q, v, work, NUMBER))
-    real = microseconds(lambda: _solutions(work.real_band, work.increment, NUMBER))
-    both = microseconds(lambda: _solutions(work.band, work.mode, NUMBER))
-    print(f"residual of a stage          {residual:6.2f} µs")
+    stage = microseconds(lambda: residuals(model, q, v, work, NUMBER))
+    real = microseconds(lambda: solutions(work.real_band, work.increment, NUMBER))
+    both = microseconds(lambda: solutions(work.band, work.mode, NUMBER))
+    print(f"residual of a stage          {stage:6.2f} µs")
     print(f"solution, real / complex     {real:6.2f} / {both:.2f} µs")
-    print(f"iteration, generalized-alpha {residual + real:6.2f} µs (aim: {TARGET:g} µs)")
-    print(f"iteration, collocation       {2 * residual + both:6.2f} µs (two stages)")
+    print(f"iteration, generalized-alpha {stage + real:6.2f} µs (aim: {TARGET:g} µs)")
+    print(f"iteration, collocation       {2 * stage + both:6.2f} µs (two stages)")
+    print(f"iteration matrix, real       {_matrix_time(model, q, v, work):6.2f} µs, made anew once a macro step")
+    for integrator in ("collocation", "generalized_alpha"):
+        print(f"macro step of 5 ms, 2 inner  {_macro_step_time(integrator):6.1f} µs ({integrator}, all outputs)")
+
+
+def _matrix_time(model: Model, q: np.ndarray, v: np.ndarray, work: dynamics.Work) -> float:
+    """Return the time to assemble and factorise the real iteration matrix, µs."""
+
+    def make() -> None:
+        for _ in range(NUMBER):
+            iteration_matrix(model, q, v, 1.0, 1e-3, 1e-6, work.real_band, work.real_matrix, work.element)
+            banded.factorise(work.real_band)
+
+    return microseconds(make)
+
+
+def _macro_step_time(integrator: str) -> float:
+    """Return the mean time of a macro step of a cable that swings, µs; called from Python."""
+    cable = Cable()
+    settings: dict[str, Value] = {"integrator": integrator, "port[1].s": 60.0, "port[1].force.z": -372.0}
+    cable.table.assign(cable.values, settings)
+    cable.initialize(0.0)
+    cable.step(0.0, 0.005)
+    start = perf_counter()
+    for k in range(1, NUMBER + 1):
+        cable.step(0.005 * k, 0.005)
+    return 1e6 * (perf_counter() - start) / NUMBER
 
 
 if __name__ == "__main__":

@@ -50,8 +50,8 @@ def kernel(function: Callable) -> Callable:
     """Compile a kernel; decorator.
 
     Without Numba's run time (reference counts) nothing can be allocated: such code does not compile. A kernel whose
-    name begins with an underscore is called by kernels only, and gets no wrapper for Python. Both shorten compilation by
-    a fifth each.
+    name begins with an underscore is called by kernels only, and gets no wrapper for Python. Both shorten compilation
+    by a fifth each.
     """
     inner = function.__name__.startswith("_")
     options: dict[str, Any] = {"_nrt": False, "no_cfunc_wrapper": True, "no_cpython_wrapper": inner}

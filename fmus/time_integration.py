@@ -9,8 +9,8 @@ M + h λ C + h² λ² K, λ being an eigenvalue of (a_ij): real for one stage, o
 
 **Collocation** (two stages, `collocation`): the nodes are the roots of P2 - γ P1, P the Legendre polynomials on [0, 1].
 γ = 0 gives Gauss (order 4, spectral radius 1 at infinity, symplectic), γ = 1 gives Radau IIA (order 3, spectral
-radius 0); γ = (1 - ρ)/(1 + ρ) gives ρ in between, with an error of third order that is γ times that of Radau. A-stable for
-every ρ. Hairer & Wanner, Solving Ordinary Differential Equations II, sections IV.3 and IV.5.
+radius 0); γ = (1 - ρ)/(1 + ρ) gives ρ in between, with an error of third order that is γ times that of Radau. A-stable
+for every ρ. Hairer & Wanner, Solving Ordinary Differential Equations II, sections IV.3 and IV.5.
 
 **Generalized-alpha** (`generalized_alpha`): order 2, spectral radius ρ at infinity; Chung & Hulbert 1993, with all
 forces at the generalised midpoint.

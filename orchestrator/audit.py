@@ -180,9 +180,10 @@ def _sources(table: Table, terms: Mapping[str, np.ndarray]) -> dict[str, np.ndar
     if not all(name in table for name in names):
         return {}
     work = {name: _since_start(table[name]) for name in names}
-    own = {c: sum(terms[signal] for signal in _signals(c)) for c in ("cable", "robot", *contacts)}
+    own = {c: np.sum([terms[signal] for signal in _signals(c)], axis=0) for c in ("cable", "robot", *contacts)}
     found = {c: own[c] - sum(work[sides[c].format(k)] for k in numbers) for c in ("cable", "robot")}
     for k, contact in zip(numbers, contacts, strict=True):
         found[contact] = own[contact] + sum(work[name.format(k)] for name in booked.values())
-        found[f"interface {contact}"] = sum(work[sides[s].format(k)] - work[booked[s].format(k)] for s in sides)
+        gaps = [work[sides[s].format(k)] - work[booked[s].format(k)] for s in sides]
+        found[f"interface {contact}"] = np.sum(gaps, axis=0)
     return found

@@ -203,8 +203,8 @@ def modes(
     table = Table("mode", "out of plane \\[Hz]", "damping", "in plane \\[Hz]", "damping", box=None, pad_edge=False)
     groups = (found.out_of_plane, found.in_plane)
     for k in range(max(group.frequency.size for group in groups)):
-        cells = [_mode_cells(group, k) for group in groups]
-        table.add_row(str(k + 1), *cells[0], *cells[1])
+        cells = [f"{x[k]:{form}}" if k < x.size else "" for g in groups for x, form in g.columns()]
+        table.add_row(str(k + 1), *cells)
     _print(table)
     if path is not None:
         vibration.write(found, path)

@@ -131,7 +131,6 @@ class Comparison:
             "observed_order": self.observed_order,
             "tolerance": self.tolerance,
             "verdict": "pass" if self.passed else "fail",
-            "reference_energy": self.reference_energy.content() if self.reference_energy else None,
         }
 
     @classmethod

@@ -26,13 +26,12 @@ INNER_STEP = "integration_step"
 def divisor(scenario: Scenario, exchange: str) -> float:
     """Return what the difference between both runs is divided by.
 
-    `waveform` has order 4 (15) where the motion is smooth, about 2 (3) where touch, lift-off or slip falls inside a
-    step; 6 lies between and serves the measured landings best. Other implicit coupling, of values at an instant, has
-    order 2. For explicit coupling, of order 1 at least, the difference is taken as it is.
+    `waveform` has order 4 where the motion is smooth and about 2 where touch, lift-off or slip falls inside a step: p
+    is taken as 3. Other implicit coupling, of values at an instant, has order 2. For explicit coupling, of order 1 at least, the difference is taken as it is.
     """
     if not MASTERS[scenario.simulation.master].IMPLICIT:
         return 1.0
-    return 6.0 if exchange == "waveform" else 3.0
+    return 7.0 if exchange == "waveform" else 3.0
 
 
 def coarser(scenario: Scenario) -> Scenario | None:

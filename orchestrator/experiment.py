@@ -252,7 +252,7 @@ def recorded(graph: Graph) -> list[str]:
         f"{component}.{name}"
         for component, fmu in graph.components.items()
         for name, port in fmu.ports.items()
-        if port.causality == "output" and port.kind != "string" and not _only_couples(name, contacts)
+        if port.causality == "output" and port.is_number and not _only_couples(name, contacts)
     ]
 
 
@@ -414,6 +414,8 @@ def write_comparison(directory: RunDirectory, comparison: Comparison, runs: list
         directory.write_fields("reference.h5", reference.fields, FIELD_UNITS)
     for coupled in runs:
         write(RunDirectory(directory.path / coupled.label), coupled, reference)
+    if comparison.reference_energy is not None:
+        directory.write_json("reference.json", {"energy": comparison.reference_energy.content()})
     directory.write_json("comparison.json", comparison.content())
     draw_comparison(directory.path, comparison, [coupled.record for coupled in runs])
     error = "; ".join(failures) or None

@@ -81,9 +81,7 @@ class Fmi2:
     def _instantiate(self) -> None:
         callbacks = fmi2CallbackFunctions()
         # FMPy's own logger goes through printf, which crashes on a stray '%'; messages are taken as they come
-        callbacks.logger = fmi2CallbackLoggerTYPE(
-            lambda _e, _n, status, _c, text: self.sink(status, _text(text))
-        )
+        callbacks.logger = fmi2CallbackLoggerTYPE(lambda _e, _n, status, _c, text: self.sink(status, _text(text)))
         callbacks.allocateMemory = fmi2CallbackAllocateMemoryTYPE(calloc)
         callbacks.freeMemory = fmi2CallbackFreeMemoryTYPE(free)
         self.slave.instantiate(callbacks=callbacks, loggingOn=True)
@@ -108,9 +106,7 @@ class Fmi2:
         tail = () if len(sizes) == 1 else (values.size,)
         return partial(function, vr.ctypes.data, vr.size, values.ctypes.data, *tail)
 
-    def directional_derivative(
-        self, unknown: np.ndarray, known: np.ndarray, seed: np.ndarray, out: np.ndarray
-    ) -> int:
+    def directional_derivative(self, unknown: np.ndarray, known: np.ndarray, seed: np.ndarray, out: np.ndarray) -> int:
         """Write d(unknown)/d(known)·seed into `out`; value references are uint32."""
         if self.PREFIX == "fmi2":
             call = self._raw(self.DERIVATIVE, c_void_p, c_size_t, c_void_p, c_size_t, c_void_p, c_void_p)
@@ -195,16 +191,12 @@ class Fmi3(Fmi2):
         return FMU3Slave(**arguments)
 
     def _instantiate(self) -> None:
-        self.slave.instantiate(
-            logMessage=lambda _e, status, _c, text: self.sink(status, _text(text)), loggingOn=True
-        )
+        self.slave.instantiate(logMessage=lambda _e, status, _c, text: self.sink(status, _text(text)), loggingOn=True)
 
     def __init__(self, description: ModelDescription, folder: Path, name: str, sink: Sink):
         super().__init__(description, folder, name, sink)
         pointer = ctypes.c_void_p
-        self._do_step = self._raw(
-            "fmi3DoStep", c_double, c_double, c_bool, pointer, pointer, pointer, pointer
-        )
+        self._do_step = self._raw("fmi3DoStep", c_double, c_double, c_bool, pointer, pointer, pointer, pointer)
         self.flags = np.zeros(3, dtype=np.bool_)  # event handling needed, terminate, early return
         self.reached = np.zeros(1)
         base = self.flags.ctypes.data

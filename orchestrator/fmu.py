@@ -33,6 +33,8 @@ KINDS: dict[str, str] = {
     "Float32": "real",
     "Boolean": "boolean",
     "String": "string",
+    "Binary": "binary",
+    "Clock": "clock",
 }
 Value = float | int | bool | str
 State = c_void_p
@@ -69,7 +71,7 @@ class Port:
     name: str
     vr: int
     unit: str
-    kind: Literal["real", "integer", "boolean", "string"]
+    kind: Literal["real", "integer", "boolean", "string", "binary", "clock"]
     causality: str
     variability: str
     start: str | None
@@ -77,6 +79,11 @@ class Port:
     variable: str
     size: int = 1
     element: int = 0
+
+    @property
+    def is_number(self) -> bool:
+        """Whether it has a place among numbers."""
+        return self.kind in ("real", "integer", "boolean")
 
 
 @dataclass(frozen=True)
@@ -192,16 +199,12 @@ class Group:
         ports = [fmu.port(name) for name in names]
         types = dict.fromkeys(p.fmi_type for p in ports)
         picks = {
-            kind: np.array([i for i, p in enumerate(ports) if p.fmi_type == kind], dtype=np.intp)
-            for kind in types
+            kind: np.array([i for i, p in enumerate(ports) if p.fmi_type == kind], dtype=np.intp) for kind in types
         }
-        if "String" in types:
-            raise ValueError(
-                f"{fmu.name}: {ports[picks['String'][0]].name} is a string and has no place among numbers"
-            )
-        self.runs = [
-            _Run(fmu, kind, [ports[i] for i in pick], pick, self.values) for kind, pick in picks.items()
-        ]
+        for port in ports:
+            if not port.is_number:
+                raise ValueError(f"{fmu.name}: {port.name} is a {port.kind} and has no place among numbers")
+        self.runs = [_Run(fmu, kind, [ports[i] for i in pick], pick, self.values) for kind, pick in picks.items()]
 
         # one direct run is the common case: its call is used as it is
         direct = len(self.runs) == 1 and self.runs[0].direct
@@ -239,9 +242,7 @@ class Group:
         bad = [name for name, value in zip(self.names, self.values, strict=True) if not np.isfinite(value)]
         if bad:
             more = f" and {len(bad) - 1} more" if len(bad) > 1 else ""
-            raise FmuError(
-                self.fmu.name, self.fmu.time, NOT_FINITE, f"output {bad[0]}{more} is not a finite number"
-            )
+            raise FmuError(self.fmu.name, self.fmu.time, NOT_FINITE, f"output {bad[0]}{more} is not a finite number")
 
 
 class Fmu:
@@ -409,9 +410,7 @@ def _read(path: Path) -> tuple[ModelDescription, str]:
     if description.coSimulation is None:
         raise ValueError(f"{path}: no co-simulation FMU; export it for co-simulation")
     if str(description.fmiVersion).startswith("1"):
-        raise ValueError(
-            f"{path}: FMI {description.fmiVersion} is not supported; export it for FMI 2.0 or 3.0"
-        )
+        raise ValueError(f"{path}: FMI {description.fmiVersion} is not supported; export it for FMI 2.0 or 3.0")
     return description, sha256
 
 
@@ -422,8 +421,7 @@ def _capabilities(description: ModelDescription) -> Capabilities:
         serialize=bool(interface.canSerializeFMUstate),
         variable_step=bool(interface.canHandleVariableCommunicationStepSize),
         directional_derivatives=bool(interface.providesDirectionalDerivative),
-        input_derivatives=bool(interface.canInterpolateInputs)
-        and str(description.fmiVersion).startswith("2"),
+        input_derivatives=bool(interface.canInterpolateInputs) and str(description.fmiVersion).startswith("2"),
     )
 
 

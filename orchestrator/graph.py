@@ -140,9 +140,7 @@ class Graph:
         self._links = _checked_links(self.components, self.connections)
         self.feedthrough = feedthrough = _dependencies(self.components, initial=False)
         derived = self.order is None
-        self.order = (
-            _derived_order(self.components, self._links, feedthrough) if derived else self._given_order()
-        )
+        self.order = _derived_order(self.components, self._links, feedthrough) if derived else self._given_order()
         self._allocate()
         self.nodes = [self._node(name) for name in self.order]
         self.discrete = [n for n in self.nodes if n.discrete_inputs.names or n.discrete_outputs.names]
@@ -179,9 +177,7 @@ class Graph:
         self.acted = self.u.copy()
         self.d, self.e = np.zeros(len(discrete)), np.zeros(len(self._discrete_outputs))
         self.source, self.gain, self.offset = _gather(continuous, self._outputs)
-        self.discrete_source, self.discrete_gain, self.discrete_offset = _gather(
-            discrete, self._discrete_outputs
-        )
+        self.discrete_source, self.discrete_gain, self.discrete_offset = _gather(discrete, self._discrete_outputs)
         torn = [i for i, k in enumerate(continuous) if rank[k.source[0]] >= rank[k.target[0]]]
         self.torn = np.array(torn, dtype=np.intp)
         self.input_names = [".".join(target) for target in self._inputs]
@@ -195,11 +191,7 @@ class Graph:
         rates, places = [], []
         for i, (component, name) in enumerate(self._inputs):
             ports, rate = self.components[component].ports, (component, suffixed(name, "_rate"))
-            known = (
-                rate[1] in ports
-                and ports[rate[1]].causality == "input"
-                and suffixed(name, "_mean") not in ports
-            )
+            known = rate[1] in ports and ports[rate[1]].causality == "input" and suffixed(name, "_mean") not in ports
             if known and rate not in fed:
                 rates.append(rate)
                 places.append(i)
@@ -244,11 +236,7 @@ class Graph:
     def gathered(self, places: np.ndarray) -> np.ndarray:
         """Return what the outputs say about the inputs at `places` of u: (len(places),)."""
         values = self.y[self.source[places]]
-        return (
-            values
-            if self.gain is None or self.offset is None
-            else values * self.gain[places] + self.offset[places]
-        )
+        return values if self.gain is None or self.offset is None else values * self.gain[places] + self.offset[places]
 
     def exchange_discrete(self) -> None:
         """Move the discrete connections (at a communication point)."""
@@ -403,9 +391,7 @@ def _checked(components: Mapping[str, Fmu], connection: Connection) -> _Link:
     )
     a, b = components[source[0]].ports[source[1]], components[target[0]].ports[target[1]]
     if a.causality != "output":
-        raise GraphError(
-            f"{where}: {connection.source} is no output but {a.causality}; connect from an output"
-        )
+        raise GraphError(f"{where}: {connection.source} is no output but {a.causality}; connect from an output")
     if b.causality != "input":
         raise GraphError(f"{where}: {connection.target} is no input but {b.causality}; connect to an input")
     if (a.kind, b.kind) not in CASTS:
@@ -487,9 +473,7 @@ def _components_of(edges: Iterable[tuple[int, int]], n: int) -> np.ndarray:
     pairs = np.array(sorted(set(edges)), dtype=np.intp).reshape(-1, 2)
     matrix = csr_array((np.ones(len(pairs)), (pairs[:, 0], pairs[:, 1])), shape=(n, n))
     _, labels = connected_components(matrix, directed=True, connection="strong")
-    ranks = _longest_paths(
-        [(labels[a], labels[b]) for a, b in pairs if labels[a] != labels[b]], int(labels.max()) + 1
-    )
+    ranks = _longest_paths([(labels[a], labels[b]) for a, b in pairs if labels[a] != labels[b]], int(labels.max()) + 1)
     return np.array([ranks[label] * (n + 1) + label for label in labels])
 
 
@@ -505,17 +489,12 @@ def _longest_paths(edges: Sequence[tuple[int, int]], n: int) -> list[int]:
     return rank
 
 
-def _derived_order(
-    components: Mapping[str, Fmu], links: list[_Link], feedthrough: Dependencies
-) -> tuple[str, ...]:
+def _derived_order(components: Mapping[str, Fmu], links: list[_Link], feedthrough: Dependencies) -> tuple[str, ...]:
     """Return an order along the connections; inside a loop along the feedthrough, else as the components
     were named."""
     names = list(components)
     index = {name: i for i, name in enumerate(names)}
-    through = {
-        name: frozenset().union(*(deps or () for deps in table.values()))
-        for name, table in feedthrough.items()
-    }
+    through = {name: frozenset().union(*(deps or () for deps in table.values())) for name, table in feedthrough.items()}
     continuous = [k for k in links if not k.discrete and k.source[0] != k.target[0]]
     edges = [(index[k.source[0]], index[k.target[0]]) for k in continuous]
     variables = [components[k.target[0]].ports[k.target[1]].variable for k in continuous]

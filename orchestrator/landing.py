@@ -68,7 +68,6 @@ def _wheels_of(path: Path) -> int:
 def problem(scenario: Scenario) -> Problem:
     """Return the landing as initialised modules, for the monolithic solver."""
     made, placement = _placed(scenario)
-    made.robot.table.assign(made.robot.values, placement.initial)
     made.robot.initialize(0.0)
     return Problem(made.cable, made.robot, [_contact(scenario, s) for s in placement.arc_lengths])
 
@@ -101,7 +100,11 @@ def _placed(scenario: Scenario) -> tuple[Problem, Placement]:
         if scenario.robot.fmu is not None:
             _look_at(robot, Path(scenario.robot.fmu), resolved)
         contact = _contact(scenario, 0.0)
+        contact.check_parameters()
         placement = place(cable, robot, contact, landing.position, landing.height, landing.velocity)
+        robot.table.assign(robot.values, placement.initial)
+        if scenario.robot.fmu is None:
+            robot.initialize(0.0)
     except ModuleError as error:
         raise InputError(f"{scenario.path}: {error}") from None
     return Problem(cable, robot, [contact]), placement

@@ -7,6 +7,7 @@ so that motion out of that plane and motion in it do not couple; the two problem
 from __future__ import annotations
 
 import csv
+from collections.abc import Sequence
 from dataclasses import dataclass
 from pathlib import Path
 
@@ -40,6 +41,10 @@ class Modes:
     frequency: np.ndarray
     damping_ratio: np.ndarray
     shape: np.ndarray
+
+    def columns(self) -> tuple[tuple[np.ndarray, str], ...]:
+        """Return what a table shows of the modes, with formats."""
+        return (self.frequency, ".6g"), (self.damping_ratio, ".3g")
 
 
 @dataclass(frozen=True)
@@ -77,7 +82,7 @@ def modes(cable: Cable, count: int) -> CableModes:
     found = []
     for basis in _free_directions(model):
         reduced = [basis.T @ matrix @ basis for matrix in (mass, damping, stiffness)]
-        found.append(_lowest(*reduced, basis, count))
+        found.append(_lowest(reduced, basis, count))
     return CableModes(model, sample(model, q), *found)
 
 
@@ -123,9 +128,10 @@ def _columns(directions: list[tuple[int, np.ndarray]], n: int) -> csc_array:
     return csc_array((np.concatenate([d for _, d in directions]), (row, column)), shape=(n, len(directions)))
 
 
-def _lowest(mass: csc_array, damping: csc_array, stiffness: csc_array, basis: csc_array, count: int) -> Modes:
-    """Return the modes of lowest frequency."""
-    size = mass.shape[0]
+def _lowest(matrices: Sequence[csc_array], basis: csc_array, count: int) -> Modes:
+    """Return the modes of lowest frequency of mass, damping and stiffness in the coordinates of `basis` (n, m)."""
+    mass, damping, stiffness = matrices
+    size = len(mass.indptr) - 1
     count = min(count, size)
     if size <= DENSE or count >= size - 1:
         values, vectors = eigh(stiffness.toarray(), mass.toarray(), subset_by_index=(0, count - 1))
@@ -151,10 +157,7 @@ def write(found: CableModes, directory: Path) -> None:
 
 
 def draw(found: CableModes, path: Path) -> None:
-    """Draw the shapes over the span.
-
-    Displacement across the plane on the left, vertical and along the span on the right.
-    """
+    """Draw the shapes over the span: across the plane on the left, vertical and along the span on the right."""
     import matplotlib.pyplot as plt
 
     from orchestrator.plots import BLUE, STYLE, VERMILION
@@ -175,6 +178,6 @@ def draw(found: CableModes, path: Path) -> None:
                 ax.set_ylim(-1.15, 1.15)
                 ax.set_yticks([0.0], [f"{group.frequency[k]:.4g} Hz"])
             axes[-1, column].set_xlabel(f"Position along the span, m ({title})")
-        axes[0, 1].legend(loc="upper right", ncols=2)
+            axes[0, column].legend(loc="upper right", ncols=2)
         figure.savefig(path)
         plt.close(figure)

@@ -109,7 +109,7 @@ def _all_outputs(graph: Graph) -> list[str]:
         f"{component}.{port.name}"
         for component, fmu in graph.components.items()
         for port in fmu.ports.values()
-        if port.causality == "output" and port.kind != "string"
+        if port.causality == "output" and port.is_number
     ]
 
 

@@ -1,4 +1,7 @@
-"""The cable in motion: order in the step, energy, waves, damping, a point mass, replay; sources in `verification/cable`."""
+"""The cable in motion: order in the step, energy, waves, damping, a point mass, replay.
+
+Where the expected values come from is said in `verification/cable`.
+"""
 
 import numpy as np
 import pytest
@@ -133,7 +136,13 @@ def test_moment_at_a_port_turns_the_cable():
     """A couple M at midspan of a hinged beam turns it there by M L/(12 EI) (Roark), for small angles."""
     made = cable(
         {"span": 2.0, "unstretched_length": 2.0, "gravity": 0.0, "linear_density": 0.1, "bending_stiffness": 100.0},
-        {"axial_stiffness": 1e6, "damping_time": 0.05, "spectral_radius": 0.0, "integration_step": 0.05, "n_elements": 10},
+        {
+            "axial_stiffness": 1e6,
+            "damping_time": 0.05,
+            "spectral_radius": 0.0,
+            "integration_step": 0.05,
+            "n_elements": 10,
+        },
     )
     made.table.assign(made.values, {"port[1].s": 1.0, "port[1].moment.x": 0.1})
     for k in range(40):

@@ -56,7 +56,7 @@ def test_force_turns_with_the_beam(seed):
 
 
 def test_spin_of_a_bent_beam():
-    """The curvature is a vector in the inertial frame: spin about it damps nothing, spin across it as if by c EI |ω × k|².
+    """The curvature is a vector in the inertial frame: spin across it is damped by c EI |ω × k|², about it by nothing.
 
     A beam without twist as a coordinate does not know how its material turns; see the README of the cable.
     """

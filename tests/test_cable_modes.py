@@ -27,7 +27,7 @@ def test_twenty_elements():
 
 
 def test_irvine():
-    """Theory for λ² = 24: 0.38936, 0.77873 Hz out of plane, 0.66231 Hz in plane; ours differ by the square of the sag."""
+    """Theory, λ² = 24: 0.38936, 0.77873 Hz out of plane, 0.66231 Hz in plane; ours differ by the square of the sag."""
     out, plane = vibration.irvine(TABLE1, 4)
     assert out[:2] == pytest.approx([0.38936, 0.77873], abs=1e-5) and plane[0] == pytest.approx(0.66231, abs=1e-5)
     for row in [*vibration.direct_irvine_rows(), *vibration.irvine_rows(60)]:
@@ -43,7 +43,9 @@ def test_clamped_beam_without_tension():
     """cos βL cosh βL = 1 (Euler–Bernoulli, clamped at both ends): βL = 4.730041, 7.853205, 10.995608."""
     settings = RIG | {"gravity": 0.0, "clamped": True, "n_elements": 40}
     found = modes(cable(settings), 3)
-    expected = np.array([4.730040745, 7.853204624, 10.995607838]) ** 2 * np.sqrt(337.8 / 0.707) / 10.0**2 / (2.0 * np.pi)
+    expected = (
+        np.array([4.730040745, 7.853204624, 10.995607838]) ** 2 * np.sqrt(337.8 / 0.707) / 10.0**2 / (2.0 * np.pi)
+    )
     assert found.out_of_plane.frequency == pytest.approx(expected, rel=1e-5)
     assert found.in_plane.frequency == pytest.approx(expected, rel=1e-5)
 

@@ -192,6 +192,16 @@ def test_a_landing_leaves_shape_and_tension(landing_run):
     assert (out / "plots" / "shapes.png").is_file()
 
 
+def test_a_landing_books_the_same_energy_on_both_sides_of_the_contact(landing_run):
+    """Cable, wheel and law: each to 1e-6 of the energy exchanged, which is the tolerance of the iteration."""
+    summary = json.loads((landing_run[1] / "summary.json").read_text())
+    balance = summary["interface_balance"]["contact1"]
+    work = sum(abs(value) for name, value in summary["interface_work_J"].items() if "force" in name)
+    assert balance["exchanged_J"] > 0.5 * work > 0.0
+    for name in ("cable_residual_J", "wheel_residual_J", "law_residual_J"):
+        assert balance[name] <= 1e-6 * balance["exchanged_J"]
+
+
 def test_a_robot_is_swapped_with_as_many_contacts_as_wheels(tmp_path: Path):
     out = tmp_path / "out"
     done = orchestrate("run", LANDING, "--robot", "hybrid_robot_2", "--out", out, "--stop", 0.01)

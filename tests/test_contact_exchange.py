@@ -46,10 +46,10 @@ def rule(m):
 
 
 def random_inputs(rng, size=1e-3):
-    """A start motion and inputs (42,) that differ from it by about `size`."""
+    """A start motion and inputs (45,) that differ from it by about `size`."""
     start = np.zeros(24)
     start[4], start[14], start[15] = 1.0, SEAT - 3e-3, 1.0
-    inputs = np.zeros(42)
+    inputs = np.zeros(45)
     inputs[:24] = start
     inputs[:24] += size * rng.normal(size=24)
     for j, i in enumerate((0, 1, 2, 3, 4, 5, 12, 13, 14, 15, 16, 17)):
@@ -80,7 +80,7 @@ def sampled(contact, start, inputs, h, m=8):
     exchange.motion_at(path, 0.0, h, motions[0])
     contact_wrench(contact._prm, motions[0], z, first)
     status, lost = exchange.sample_law(
-        contact._prm, path, h, nodes, weights, increments, end, z, motions, samples
+        contact._prm, path, h, nodes, weights, increments, end, np.zeros(3), z, motions, samples
     )
     assert status == 0
     return nodes, weights, motions, samples, lost, first[25] + first[26]
@@ -94,9 +94,7 @@ def test_work_booked_is_the_work_of_the_law(seed):
     start, inputs = random_inputs(np.random.default_rng(seed))
     _, weights, motions, samples, *_ = sampled(contact, start, inputs, h)
     w = h * weights
-    law_wheel = w @ np.sum(
-        samples[:8, 6:9] * motions[:8, 18:21] + samples[:8, 9:12] * motions[:8, 21:24], axis=1
-    )
+    law_wheel = w @ np.sum(samples[:8, 6:9] * motions[:8, 18:21] + samples[:8, 9:12] * motions[:8, 21:24], axis=1)
     turn = np.cross(motions[:8, 3:6], motions[:8, 9:12]) / np.sum(motions[:8, 3:6] ** 2, axis=1)[:, None]
     law_push = w @ np.sum(samples[:8, 0:3] * motions[:8, 6:9], axis=1)
     law_turn = w @ np.sum(samples[:8, 3:6] * turn, axis=1)
@@ -492,7 +490,7 @@ def test_bad_motion_is_named():
 def test_contract_names_are_there():
     """The names other components connect to; vectors by component."""
     for side, names in (
-        ("cable", "position tangent velocity tangent_rate position_mean tangent_mean"),
+        ("cable", "position tangent velocity tangent_rate position_mean tangent_mean curvature"),
         ("wheel", "position axle velocity angular_velocity position_mean axle_mean rotation rotation_mean"),
     ):
         for name in names.split():

@@ -230,9 +230,7 @@ def test_turned_and_mirrored_motion_gives_turned_and_mirrored_wrench(seed):
     polar, axial = np.array([-1.0, 1.0, 1.0]), np.array([1.0, -1.0, -1.0])
     mirror = np.concatenate([polar, polar, polar, polar, polar, -polar, polar, axial])
     image = wrench(mirror * motion, slip * [1.0, -1.0])
-    np.testing.assert_allclose(
-        image[:12], np.concatenate([polar, axial, polar, axial]) * out[:12], atol=tolerance
-    )
+    np.testing.assert_allclose(image[:12], np.concatenate([polar, axial, polar, axial]) * out[:12], atol=tolerance)
     assert image[14] == pytest.approx(-out[14], abs=tolerance)
 
 
@@ -264,9 +262,7 @@ def test_restitution_of_hunt_crossley():
         run = solve_ivp(fall, (0, 1), [0.0, speed], events=lift, rtol=1e-10, atol=1e-14, max_step=1e-3)
         E = SIN
         before = E * speed - math.log(1 + E * speed)
-        after = brentq(
-            lambda v, E=E, c=before: -E * v - math.log(1 - E * v) - c, 1e-9, min(speed, (1 - 1e-12) / E)
-        )
+        after = brentq(lambda v, E=E, c=before: -E * v - math.log(1 - E * v) - c, 1e-9, min(speed, (1 - 1e-12) / E))
         assert -run.y[1, -1] == pytest.approx(after, rel=1e-6)
 
 

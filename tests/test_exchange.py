@@ -16,7 +16,7 @@ from scipy.integrate import solve_ivp
 from orchestrator.graph import Connection, Graph
 from orchestrator.masters import MASTERS
 from orchestrator.simulation import Log, simulate
-from tests.fmus import fmu
+from tests.fmus import chain, chain_solution, fmu
 
 WAVEFORM, HERMITE, POINT = 0.0, 1.0, 2.0
 OMEGA_H = [0.1, 1.0, 3.0, 3.3, 3.6, 10.0, 100.0, 1000.0]
@@ -306,3 +306,13 @@ def test_work_of_a_force_that_the_master_joins_or_extrapolates(master, extrapola
     graph = system({"a": {"initial_position": 0.1}}, {"stiffness": 100.0, "exchange": POINT}, rates=False)
     log = run(graph, 1.0, record=["a.velocity"], master=master, **options)
     assert log.energy["a.force"] == pytest.approx(0.5 * log.values[:, 0] ** 2, abs=1e-12)
+
+
+def test_chain_of_twelve_masses_springs_and_dampers_has_order_4():
+    """Eleven interfaces, solved together; the matrix exponential of the whole chain."""
+    errors = []
+    for step in (0.04, 0.02):
+        graph = chain(12, waveform=True, damping=1.0)
+        log = run(graph, 1.2, step, [f"m{i}.position" for i in range(12)], tolerance=1e-10)
+        errors.append(np.max(np.abs(log.values - chain_solution(log.time, 12, damping=1.0))[:: round(0.04 / step)]))
+    assert math.log2(errors[0] / errors[1]) == pytest.approx(4.0, abs=0.2)

@@ -6,6 +6,7 @@ import shutil
 import subprocess
 import sys
 import zipfile
+from pathlib import Path
 
 import numpy as np
 import pytest
@@ -14,7 +15,7 @@ from orchestrator.fmu import NOT_FINITE, TIMEOUT, Fmu, FmuError, suffixed, unzip
 from orchestrator.graph import Connection, Graph
 from orchestrator.masters import MASTERS
 from orchestrator.simulation import simulate
-from tests.fmus import build, build_fmi3, compiler, fmu
+from tests.fmus import build, compiled, compiler, fmu
 
 
 @pytest.fixture
@@ -226,7 +227,7 @@ needs_compiler = pytest.mark.skipif(compiler() is None, reason="no C compiler on
 @needs_compiler
 def test_fmi3_arrays_types_and_states():
     """u = (1, 2) mm held for 0.5 s from x = 1: x = 1 + 1.5, y = (x, 2 x); by hand."""
-    lag = Fmu(build_fmi3(), "lag")
+    lag = Fmu(compiled("lag3"), "lag")
     assert [lag.ports[n].unit for n in ("u[1]", "u[2]", "y[1]")] == ["mm", "mm", "m"]
     lag.set_parameters({"start": 1.0})
     started(lag)
@@ -244,13 +245,75 @@ def test_fmi3_arrays_types_and_states():
     lag.close()
 
 
+def described(path: Path, folder: Path, *changes: tuple[str, str]) -> Path:
+    """Copy an FMU with parts of its model description replaced."""
+    copy = folder / f"changed_{path.name}"
+    with zipfile.ZipFile(path) as old, zipfile.ZipFile(copy, "w") as new:
+        for name in old.namelist():
+            content = old.read(name)
+            for before, after in changes if name == "modelDescription.xml" else ():
+                assert before.encode() in content
+                content = content.replace(before.encode(), after.encode())
+            new.writestr(name, content)
+    return copy
+
+
+@needs_compiler
+def test_fmi3_types_that_are_no_numbers_are_left_alone(tmp_path: Path):
+    """A binary output and a clock: neither recorded nor read, named when they are asked for."""
+    more = '<Binary name="blob" valueReference="8" causality="output"/>'
+    more += (
+        '<Clock name="tick" valueReference="9" causality="output" intervalVariability="triggered"/></ModelVariables>'
+    )
+    lag = Fmu(described(compiled("lag3"), tmp_path, ("</ModelVariables>", more)), "lag")
+    graph = Graph({"lag": lag}, [])
+    log = simulate(graph, MASTERS["jacobi"](graph), 0.0, 0.1, 0.1)
+    assert log.error is None
+    assert log.signals == ["lag.y[1]", "lag.y[2]", "lag.count", "lag.flag"]
+    with pytest.raises(ValueError, match="blob is a binary"):
+        lag.group(["blob"])
+    graph.close()
+
+
+@needs_compiler
+def test_units_with_an_offset_are_converted(tmp_path: Path):
+    """25 degC is 298.15 K; x' = 298.15 K for 0.1 s."""
+    path = compiled("lag2")
+    kelvin = '<Unit name="K"><BaseUnit K="1"/></Unit>'
+    celsius = '<Unit name="degC"><BaseUnit K="1" offset="273.15"/></Unit>'
+    units = "<ModelVariables>", f"<UnitDefinitions>{kelvin}{celsius}</UnitDefinitions><ModelVariables>"
+    (tmp_path / "out").mkdir()
+    hot = described(path, tmp_path / "out", units, ("<Real/>", '<Real unit="degC"/>'))
+    cold = described(path, tmp_path, units, ('causality="input"><Real', 'causality="input"><Real unit="K"'))
+    parts = {"hot": Fmu(hot, "hot"), "cold": Fmu(cold, "cold")}
+    parts["hot"].set_parameters({"start": 25.0, "gain": 0.0})
+    graph = Graph(parts, [Connection("hot.y", "cold.u")])
+    log = simulate(graph, MASTERS["jacobi"](graph), 0.0, 0.1, 0.1, ["cold.y"])
+    graph.close()
+    assert log.values[-1, 0] == pytest.approx(29.815, rel=1e-12)
+
+
+@needs_compiler
+@pytest.mark.parametrize("master", MASTERS)
+def test_fmu_in_c_with_every_master(master):
+    """p' = q, q' = -p: p = cos t. Held inputs at H = 1 ms leave at most t H/2, twice that for Jacobi's phase."""
+    parts = {name: Fmu(compiled("lag2"), name) for name in "pq"}
+    parts["p"].set_parameters({"start": 1.0})
+    parts["q"].set_parameters({"gain": -1.0})
+    graph = Graph(parts, [Connection("p.y", "q.u"), Connection("q.y", "p.u")])
+    log = simulate(graph, MASTERS[master](graph), 0.0, 1.0, 1e-3, ["p.y"])
+    graph.close()
+    assert log.error is None and log.unconverged == 0
+    assert np.max(np.abs(log.values[:, 0] - np.cos(log.time))) < 1e-3
+
+
 @needs_compiler
 def test_fmi3_and_fmi2_in_one_graph():
     """Two FMI 3.0 lags in a loop, metres into millimetres: p' = 1000 q, q' = 1000 p, so p = cosh(1000 t) mm;
     order 2."""
     errors = []
     for H in (1e-4, 5e-5):
-        lags = {n: Fmu(build_fmi3(), n) for n in ("p", "q")}
+        lags = {n: Fmu(compiled("lag3"), n) for n in ("p", "q")}
         lags["p"].set_parameters({"start": 1e-3})
         pairs = [("p.y[1]", "q.u[1]"), ("q.y[1]", "p.u[2]"), ("p.y[1]", "c.u")]
         graph = Graph({**lags, "c": fmu("odd", "c", gain=1.0)}, [Connection(*pair) for pair in pairs])

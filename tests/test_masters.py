@@ -128,9 +128,7 @@ def test_unconditional_stability_without_damping(master):
     """omega H from 0.1 to 1000: the energy-conjugate exchange neither grows nor damps (|x| bounded by the
     energy)."""
     for stiffness in (1e2, 1e4, 1e6, 1e8, 1e10):
-        log = run(
-            chain(2, waveform=True, stiffness=stiffness), master, 0.01, 10.0, ["m0.position", "m0.velocity"]
-        )
+        log = run(chain(2, waveform=True, stiffness=stiffness), master, 0.01, 10.0, ["m0.position", "m0.velocity"])
         energy = 0.5 * stiffness * 0.1**2 + 0.5 * 10.0 * 0.1**2
         assert log.error is None
         assert log.unconverged == 0
@@ -157,13 +155,9 @@ def test_impact_within_a_macro_step_converges(master):
     log = bouncing(master, 0.005, 1e7)
     assert log.error is None
     assert log.unconverged == 0
-    ground = 100.0 * np.concatenate(
-        [[0.0], np.cumsum(0.5 * (log.values[1:, 2] + log.values[:-1, 2])) * 0.005]
-    )
+    ground = 100.0 * np.concatenate([[0.0], np.cumsum(0.5 * (log.values[1:, 2] + log.values[:-1, 2])) * 0.005])
     momentum = log.values[:, 0] + 2.0 * log.values[:, 1] + ground
-    assert momentum == pytest.approx(
-        1.0, abs=2e-3
-    )  # the impulse of the ground spring by the trapezoidal rule
+    assert momentum == pytest.approx(1.0, abs=2e-3)  # the impulse of the ground spring by the trapezoidal rule
 
 
 @pytest.mark.parametrize("master", ITERATED)

@@ -30,9 +30,7 @@ GENERAL = {
     "initial.roll": 0.3,
     "initial.pitch": -0.4,
     "initial.yaw": 1.2,
-    **dict(
-        zip(("center_of_mass.x", "center_of_mass.y", "center_of_mass.z"), (0.05, -0.1, -0.2), strict=True)
-    ),
+    **dict(zip(("center_of_mass.x", "center_of_mass.y", "center_of_mass.z"), (0.05, -0.1, -0.2), strict=True)),
 }
 """A body without any symmetry: wheel 1 braked, wheel 2 free on an oblique axle."""
 
@@ -43,24 +41,14 @@ def components(name, vector):
 
 GENERAL |= components("wheel[1].mount", (0.3, 0.1, 0.4)) | components("wheel[2].mount", (-0.2, 0.5, 0.1))
 GENERAL |= components("wheel[2].axle_direction", (1.0, 2.0, -0.5))
-GENERAL |= components("initial.position", (0.4, 80.0, -1.5)) | components(
-    "initial.velocity", (0.5, -0.2, 0.1)
-)
+GENERAL |= components("initial.position", (0.4, 80.0, -1.5)) | components("initial.velocity", (0.5, -0.2, 0.1))
 GENERAL |= components("initial.angular_velocity", (0.9, -1.4, 1.1))
 
 LOADS = {"thrust": 50.0} | components("torque", (1.0, -2.0, 0.5))
-LOADS |= components("wheel[1].force", (10.0, -5.0, 40.0)) | components(
-    "wheel[1].force_rate", (100.0, 60.0, -200.0)
-)
-LOADS |= components("wheel[1].moment", (1.0, 3.0, -2.0)) | components(
-    "wheel[1].moment_rate", (20.0, -30.0, 10.0)
-)
-LOADS |= components("wheel[2].force", (-4.0, 6.0, 20.0)) | components(
-    "wheel[2].force_rate", (50.0, -80.0, 30.0)
-)
-LOADS |= components("wheel[2].moment", (0.5, -1.0, 1.5)) | components(
-    "wheel[2].moment_rate", (-9.0, 12.0, 7.0)
-)
+LOADS |= components("wheel[1].force", (10.0, -5.0, 40.0)) | components("wheel[1].force_rate", (100.0, 60.0, -200.0))
+LOADS |= components("wheel[1].moment", (1.0, 3.0, -2.0)) | components("wheel[1].moment_rate", (20.0, -30.0, 10.0))
+LOADS |= components("wheel[2].force", (-4.0, 6.0, 20.0)) | components("wheel[2].force_rate", (50.0, -80.0, 30.0))
+LOADS |= components("wheel[2].moment", (0.5, -1.0, 1.5)) | components("wheel[2].moment_rate", (-9.0, 12.0, 7.0))
 LOADS["wheel[2].drive_torque"] = 0.8
 
 
@@ -145,16 +133,12 @@ class Reference:
 
     def solve(self, H):
         """Return the outputs after one macro step, by name."""
-        R = Rotation.from_euler(
-            "ZYX", [self.values[f"initial.{a}"] for a in ("yaw", "pitch", "roll")]
-        ).as_matrix()
+        R = Rotation.from_euler("ZYX", [self.values[f"initial.{a}"] for a in ("yaw", "pitch", "roll")]).as_matrix()
         w, v_b = self.get("initial.angular_velocity"), self.get("initial.velocity")
         v = v_b + np.cross(w, R @ self.G)
         L = R @ self.J @ R.T @ w
         axial = self.spin_inertia * (R @ self.axle) @ w
-        start = np.concatenate(
-            [self.get("initial.position") + R @ self.G, R.ravel(), self.values["mass"] * v, L]
-        )
+        start = np.concatenate([self.get("initial.position") + R @ self.G, R.ravel(), self.values["mass"] * v, L])
         y0 = np.concatenate([start, [axial], np.zeros(3 + 12 + 6 + 6)])
         y = solve_ivp(self.rates, (-H / 2, H / 2), y0, "DOP853", rtol=1e-13, atol=1e-13).y[:, -1]
         return self.outputs(y, H)
@@ -245,9 +229,7 @@ def flip(robot_step, stop=100.0):
     inertia, start = np.array([1.0, 2.0, 2.6]), np.array([1.0, 0.0, 0.0])
     k2 = 0.99
     # k² = (I2 - I1) I1 w1² / ((I3 - I2) I3 w3²) for a start with w2 = 0.
-    start[2] = math.sqrt(
-        (inertia[1] - inertia[0]) * inertia[0] / ((inertia[2] - inertia[1]) * inertia[2] * k2)
-    )
+    start[2] = math.sqrt((inertia[1] - inertia[0]) * inertia[0] / ((inertia[2] - inertia[1]) * inertia[2] * k2))
     settings = {f"inertia.{a}{a}": value for a, value in zip("xyz", inertia, strict=True)}
     settings |= components("initial.angular_velocity", start)
     robot = make(1, **settings, gravity=0.0, integration_step=robot_step)
@@ -427,9 +409,7 @@ def test_turned_about_the_vertical(angle):
         robot.table.assign(robot.values, applied)
         run(robot, 0.2, 0.02)
     for name in WHEEL_SIGNALS:
-        np.testing.assert_allclose(
-            turn.apply(vector(robots[0], name)), vector(robots[1], name), rtol=0, atol=2e-12
-        )
+        np.testing.assert_allclose(turn.apply(vector(robots[0], name)), vector(robots[1], name), rtol=0, atol=2e-12)
 
 
 # State, angles, errors

@@ -49,10 +49,7 @@ def test_inertia_scales_with_the_mass(mass):
 
 
 def test_the_number_of_wheels_is_that_of_table_4():
-    wheels = {
-        name: load_robot(name).n_wheels
-        for name in ("hybrid_robot_1", "hybrid_robot_2", "linedrone", "fptlir")
-    }
+    wheels = {name: load_robot(name).n_wheels for name in ("hybrid_robot_1", "hybrid_robot_2", "linedrone", "fptlir")}
     assert wheels == {"hybrid_robot_1": 3, "linedrone": 4, "hybrid_robot_2": 2, "fptlir": 1}
 
 

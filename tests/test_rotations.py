@@ -60,9 +60,7 @@ def test_product(u, v):
     rotations.from_rotation_vector(v, q)
     rotations.multiply(p, q, out)
     expected = (Rotation.from_rotvec(u) * Rotation.from_rotvec(v)).as_matrix()
-    np.testing.assert_allclose(
-        Rotation.from_quat(out, scalar_first=True).as_matrix(), expected, atol=ROUND_OFF
-    )
+    np.testing.assert_allclose(Rotation.from_quat(out, scalar_first=True).as_matrix(), expected, atol=ROUND_OFF)
 
 
 def test_quaternion_rate_is_the_derivative():

@@ -14,7 +14,12 @@ import matplotlib
 
 from verification.study import page_section
 
-SECTIONS = {"cable": "Cable", "coupling": "Coupling"}
+SECTIONS = {
+    "cable": "Cable",
+    "exchange": "Exchange within a macro step",
+    "coupling": "Coupling",
+    "system": "Whole system",
+}
 """Package below `verification` → heading, in the order of the page."""
 ROOT = Path(__file__).resolve().parent.parent
 PAGE = ROOT / "docs" / "verification.md"

@@ -53,14 +53,27 @@ class Result:
         return all(row.passed for row in self.rows)
 
 
+LONG = 30
+"""Rows above which a table is folded on the page."""
+
+
 def page_section(study: ModuleType, result: Result) -> str:
     """Return a study's part of the page, in Markdown."""
     parts = [f"### {study.TITLE}", cleandoc(study.__doc__ or "")]
     parts += [f"![{caption}](figures/{name})\n\n*{caption}*" for name, caption in result.figures]
-    parts.append(_table(result.rows))
+    parts.append(_folded(result.rows) if len(result.rows) > LONG else _table(result.rows))
     if result.remark:
         parts.append(cleandoc(result.remark))
     return "\n\n".join(parts) + "\n"
+
+
+def _folded(rows: Sequence[Row]) -> str:
+    """Return a table behind a line that says how many rows pass and how near the worst one is to its tolerance."""
+    worst = max(rows, key=lambda row: row.error / row.tolerance)
+    passed = sum(row.passed for row in rows)
+    line = f"{passed} of {len(rows)} quantities within their tolerance"
+    nearest = f"nearest to it: {worst.quantity}, error {worst.error:.1e} of {worst.tolerance:.0e} allowed"
+    return f"<details><summary>{line}; {nearest}</summary>\n\n{_table(rows)}\n\n</details>"
 
 
 def _table(rows: Sequence[Row]) -> str:

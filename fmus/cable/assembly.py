@@ -189,6 +189,17 @@ def interpolate(model, x, s, shape, out):
 
 
 @kernel
+def curvature(model, q, s, shape, out):
+    """Write d²r/ds² at arc length `s` to `out` (3,): the exact one of the element that `locate` gives."""
+    e = locate(model, s, shape)
+    l, o = model.s[e + 1] - model.s[e], 6 * e
+    xi = min(1.0, max(0.0, (s - model.s[e]) / l))
+    for k in range(3):
+        chord = (q[o + 6 + k] - q[o + k]) / l
+        out[k] = ((6.0 - 12.0 * xi) * chord + (6.0 * xi - 4.0) * q[o + 3 + k] + (6.0 * xi - 2.0) * q[o + 9 + k]) / l
+
+
+@kernel
 def kinetic_energy(model, v, work, scratch):
     """Return v·M v / 2; `scratch` (n,) is workspace."""
     scratch[:] = 0.0

@@ -20,6 +20,7 @@ from fmus.cable.assembly import (
     add_inertia,
     add_load,
     constrain_vector,
+    curvature,
     dot,
     element_work,
     internal_force,
@@ -114,10 +115,7 @@ def state_size(n: int) -> int:
 
 @kernel
 def residual(model, q, v, a, external, force, axial, work):
-    """Write M a + Q(q, v) - weight - external to `force` (n,), before the supports are applied.
-
-    Return dissipated power.
-    """
+    """Write M a + Q(q, v) - weight - external to `force` (n,), supports not applied; return dissipated power."""
     power = internal_force(model, q, v, force, axial, work)[1]
     add_inertia(model, a, force, work)
     for i in range(force.size):
@@ -281,8 +279,8 @@ def collocation_step(model, method, state, h, offset, ports, tolerance, fresh, w
 def generalized_alpha_step(model, method, state, h, offset, ports, tolerance, fresh, work):
     """Advance the flat `state` by one inner step of generalized-alpha; parameters as in `collocation_step`.
 
-    Chung & Hulbert 1993, eqs. (5)–(9), with all forces at the generalised midpoint t + (1 - alpha_f) h: the load of
-    a macro step is then never taken from its neighbour. The first row of accelerations is a, the second its value at the
+    Chung & Hulbert 1993, eqs. (5)–(9), with all forces at the generalised midpoint t + (1 - alpha_f) h: the load of a
+    macro step is then never taken from its neighbour. The first row of accelerations is a, the second its value at the
     midpoint. `start_alpha` and `end_alpha` enclose the inner steps of a macro step.
     """
     n = model.weight.size
@@ -374,20 +372,22 @@ def port_motion(model, state, s, shape, out):
 
 
 @kernel
-def macro_step(model, collocation, alpha, use_alpha, state, h, longest, ports, means, work):
-    """Advance `state` by the macro step `h` with inner steps of at most `longest`.
+def macro_step(model, collocation, alpha, use_alpha, state, h, longest, ports, shown, out, rows, work):
+    """Advance `state` by the macro step `h` with inner steps of at most `longest`, and write all outputs.
 
     An inner step that does not converge is repeated at half its length, up to MAX_HALVINGS times.
 
     Parameters
     ----------
     ports : (N_PORTS, 13), see `collocation_step`
-    means : (N_PORTS, 6), receives the time means of position and tangent over the macro step: over each inner
-        step (x0 + x1)/2 + h/12 (x0' - x1'), the mean of the cubic through its ends
+    shown : (N_PORTS, 19), receives what `show_ports` writes, then the time means of position and tangent over the macro
+        step (over each inner step (x0 + x1)/2 + h/12 (x0' - x1'), the mean of the cubic through its ends) and the work
+    out, rows : see `diagnose`
     """
     n = model.weight.size
     sums = state[4 * n :]
     tolerance = CONVERGED * max(1.0, model.s[-1] / 200.0)
+    means = work.means
     means[:, :] = 0.0
     first = work.first
     for k in range(N_PORTS):
@@ -441,6 +441,12 @@ def macro_step(model, collocation, alpha, use_alpha, state, h, longest, ports, m
             end = work.start[k, i]
             sums[WORK + k] += force * (end - first[k, i]) + rate * h * (0.5 * (first[k, i] + end) - means[k, i])
     sums[LAST_MACRO] = h
+    show_ports(model, state, ports, shown, work)
+    for k in range(N_PORTS):
+        for i in range(6):
+            shown[k, 12 + i] = means[k, i]
+        shown[k, 18] = sums[WORK + k]
+    diagnose(model, collocation, use_alpha, state, ports, out, rows, work)
     return OK
 
 
@@ -455,24 +461,11 @@ def mean_axial_force(model, s, axial, shape):
 
 @kernel
 def show_ports(model, state, ports, shown, work):
-    """Write position, tangent, velocity and tangent rate of every port to the rows of `shown` (N_PORTS, 19)."""
+    """Write position, tangent, velocity, tangent rate and d²r/ds² of every port to `shown` (N_PORTS, 22)."""
+    n = model.weight.size
     for k in range(N_PORTS):
         port_motion(model, state, ports[k, 0], work.shape, shown[k, 0:12])
-
-
-@kernel
-def step_and_show(model, collocation, alpha, use_alpha, state, h, longest, ports, shown, out, rows, work):
-    """Make a macro step and write all outputs: `macro_step`, `show_ports` and `diagnose` in one call."""
-    status = macro_step(model, collocation, alpha, use_alpha, state, h, longest, ports, work.means, work)
-    if status != OK:
-        return status
-    show_ports(model, state, ports, shown, work)
-    for k in range(N_PORTS):
-        for i in range(6):
-            shown[k, 12 + i] = work.means[k, i]
-        shown[k, 18] = state[4 * model.weight.size + WORK + k]
-    diagnose(model, collocation, use_alpha, state, ports, out, rows, work)
-    return OK
+        curvature(model, state[:n], ports[k, 0], work.shape, shown[k, 19:22])
 
 
 @kernel
@@ -482,8 +475,8 @@ def diagnose(model, method, use_alpha, state, ports, out, rows, work):
     Parameters
     ----------
     ports : (N_PORTS, 13), the loads of the macro step that has just been made
-    out : (13,), receives tension left, mid, right, kinetic, elastic, gravitational and dissipated energy, force of
-        the left support (3) and of the right one (3) on the cable
+    out : (13,), receives tension left, mid, right, kinetic, elastic, gravitational and dissipated energy, force of the
+        left support (3) and of the right one (3) on the cable
     rows : (m, 4), receives position and axial force at equally spaced arc lengths
     """
     n = model.weight.size

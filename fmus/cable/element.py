@@ -31,7 +31,7 @@ BEND = np.stack([6 - 12 * _xi, 6 * _xi - 4, 6 * _xi - 2], axis=1)
 
 @kernel
 def shape(xi, length, out):
-    """Write the Hermite shape functions s_a (eq. 7) to ``out[0:4]``, their derivatives by x to ``out[4:8]``."""
+    """Write the Hermite functions s_a (eq. 7) to ``out[0:4]``, their derivatives by arc length to ``out[4:8]``."""
     out[0] = 1.0 - 3.0 * xi * xi + 2.0 * xi**3
     out[1] = length * (xi - 2.0 * xi * xi + xi**3)
     out[2] = 3.0 * xi * xi - 2.0 * xi**3

@@ -78,9 +78,11 @@ def _port(k: int) -> tuple[list[Variable], list[Variable]]:
     outputs += vector(f"{p}.velocity", "output", "m/s", "velocity of the contact point", feedthrough=f)
     outputs += vector(f"{p}.tangent_rate", "output", "1/s", "rate of dr/ds", feedthrough=f)
     # before the first step the means are the values, hence their dependence on s
-    outputs += vector(f"{p}.position_mean", "output", "m", "its time mean over the last macro step", feedthrough=f)
-    outputs += vector(f"{p}.tangent_mean", "output", "1", "its time mean over the last macro step", feedthrough=f)
+    over = "over the last macro step"
+    outputs += vector(f"{p}.position_mean", "output", "m", f"time mean of position {over}", feedthrough=f)
+    outputs += vector(f"{p}.tangent_mean", "output", "1", f"time mean of tangent {over}", feedthrough=f)
     outputs.append(Variable(f"{p}.work", "output", "J", 0.0, "work done on the cable through this port"))
+    outputs += vector(f"{p}.curvature", "output", "1/m", "d²r/ds² there", feedthrough=f)
     return inputs, outputs
 
 
@@ -124,7 +126,7 @@ class Cable:
         self.values = self.table.defaults()
         self.state = np.zeros(0)
         self._ports = self._rows("port[1].s", N_PORTS, 13)
-        self._shown_ports = self._rows("port[1].position.x", N_PORTS, 19)
+        self._shown_ports = self._rows("port[1].position.x", N_PORTS, 22)
         self._shape = self._rows("shape[1].position.x", N_SHAPE, 4)
         self._shown = self._rows("tension_left", 1, 13)[0]
 
@@ -189,8 +191,8 @@ class Cable:
             return float(root_scalar(excess, bracket=(0.99 * chord, longest), xtol=1e-12 * chord).root)
         except ValueError:
             raise ModuleError(
-                f"cable: sag: {self['sag']:g} m cannot be reached; check it against span, axial_stiffness and "
-                "linear_density"
+                f"cable: sag: {self['sag']:g} m cannot be reached; "
+                "check it against span, axial_stiffness and linear_density"
             ) from None
 
     def _check(self) -> None:
@@ -219,7 +221,7 @@ class Cable:
                 f"cable: port[{k + 1}].s = {self._ports[k, 0]:g} m is off the cable (0 to {self.model.s[-1]:g} m) at "
                 f"t = {t:g} s: the wheel has run past a support; stop the run earlier, or brake the robot"
             )
-        status = dynamics.step_and_show(
+        status = dynamics.macro_step(
             self.model,
             self._collocation,
             self._alpha,
@@ -240,10 +242,7 @@ class Cable:
             )
 
     def refresh(self) -> None:
-        """Write the motion of the ports at the present state and arc lengths.
-
-        All else stays as the last step left it.
-        """
+        """Write the motion of the ports at the present state and arc lengths; all else stays as it is."""
         dynamics.show_ports(self.model, self.state, self._ports, self._shown_ports, self._work)
 
     def show(self) -> None:

@@ -52,8 +52,8 @@ def mesh_model(
 def catenary(model: Model, span: float, level_difference: float) -> np.ndarray:
     """Return nodal coordinates (n,) on the elastic catenary between the supports: no bending stiffness.
 
-    Irvine, Cable Structures, 1981, section 1.3: with the horizontal tension H and the vertical tension V at the left
-    end, y(s) = H s/EA + H/w (asinh(V/H) - asinh((V - w s)/H)), and likewise z(s). Strains here are engineering strains.
+    Irvine, Cable Structures, 1981, section 1.3: with horizontal tension H and vertical tension V at the left end,
+    y(s) = H s/EA + H/w (asinh(V/H) - asinh((V - w s)/H)), and likewise z(s). Strains here are engineering strains.
     A weightless or very taut cable is put on the straight line.
     """
     weight = model.density * model.gravity * model.s[-1]
@@ -119,8 +119,8 @@ def _on_line(model: Model, span: float, level_difference: float) -> np.ndarray:
 def equilibrium(model: Model, span: float, level_difference: float, load: np.ndarray | None = None) -> np.ndarray:
     """Return the coordinates (n,) in static equilibrium under gravity and `load`.
 
-    The potential energy is minimised by Newton's method from the catenary. Should that fail (a slack cable in
-    clamps, whose bending layer is shorter than an element), the bending stiffness is lowered to its value in steps.
+    The potential energy is minimised by Newton's method from the catenary. Should that fail (a slack cable in clamps,
+    whose bending layer is shorter than an element), the bending stiffness is lowered to its value in steps.
 
     Parameters
     ----------
@@ -146,8 +146,8 @@ def equilibrium(model: Model, span: float, level_difference: float, load: np.nda
 def _cure(model: Model) -> str:
     """Return what to do about a missing equilibrium.
 
-    In clamps, elements much longer than the bending layer √(EI/T) cannot follow it: a slack cable then buckles
-    there, on paper only, and the equilibrium in the vertical plane is not a minimum of the energy.
+    In clamps, elements much longer than the bending layer √(EI/T) cannot follow it: a slack cable then buckles there,
+    on paper only, and the equilibrium in the vertical plane is not a minimum of the energy.
     """
     weight = model.density * model.gravity * model.s[-1]
     if weight == 0.0:
@@ -162,10 +162,7 @@ def _cure(model: Model) -> str:
 
 
 def _bending_stiffnesses(model: Model, n: int) -> np.ndarray:
-    """Return `n` falling bending stiffnesses that end with the model's.
-
-    The first makes a layer of an element's length.
-    """
+    """Return `n` falling bending stiffnesses that end with the model's; the first has a layer as long as an element."""
     weight = model.density * model.gravity * model.s[-1]
     first = weight * np.max(np.diff(model.s)) ** 2
     if n == 1 or first <= model.ei:
@@ -202,10 +199,7 @@ class _Potential:
         return energy - dot(self.external, q - self.q0), residual
 
     def newton_step(self, q: np.ndarray, residual: np.ndarray, shift: float) -> np.ndarray | None:
-        """Return the step with the matrix shifted by `shift` times the mass matrix.
-
-        None unless it is positive definite.
-        """
+        """Return the step with the matrix shifted by `shift` mass matrices; None unless it is positive definite."""
         iteration_matrix(self.model, q, self.zero, shift, 0.0, 1.0, self.band, self.matrix, self.work)
         if banded.factorise(self.band) or np.any(self.band[:, HALF_BANDWIDTH] <= 0.0):
             return None
@@ -232,7 +226,7 @@ def _minimise(model: Model, q: np.ndarray, external: np.ndarray) -> tuple[bool, 
             continue
         fraction, energy, residual = found
         q = q + fraction * step
-        change = fraction * _largest(step)
+        change = _largest(step) if fraction == 1.0 else np.inf
         small = small + 1 if change < 100.0 * TOLERANCE * model.s[-1] and shift == 0.0 else 0
         if small >= 2 or (small and change < TOLERANCE * model.s[-1]):
             return True, q
@@ -243,18 +237,27 @@ def _minimise(model: Model, q: np.ndarray, external: np.ndarray) -> tuple[bool, 
 def _line_search(
     potential: _Potential, q: np.ndarray, step: np.ndarray, energy: float, residual: np.ndarray
 ) -> tuple[float, float, np.ndarray] | None:
-    """Return the part of `step` that lowers the energy enough (Armijo), with energy and residual there.
+    """Return the part of `step` that lowers the energy enough (Armijo), with energy and residual there, or None.
 
-    None if none does.
+    Near the solution the gain is lost in the round-off of the energy; there the residual has to fall.
     """
-    fraction = min(1.0, 0.1 * potential.model.s[-1] / max(_largest(step), 1e-300))
+    length = potential.model.s[-1]
+    if _largest(step) < 100.0 * TOLERANCE * length:  # the energy cannot tell such steps apart
+        return 1.0, *potential.evaluate(q + step)
+    fraction = min(1.0, 0.1 * length / max(_largest(step), 1e-300))
     slope = dot(residual, step)
     for _ in range(30):
         trial, there = potential.evaluate(q + fraction * step)
-        if trial <= energy + 1e-4 * fraction * slope + 1e-13 * (abs(trial) + abs(energy)):
+        round_off = 1e-13 * (abs(trial) + abs(energy))
+        if trial <= energy + 1e-4 * fraction * slope + round_off or (fraction == 1.0 and _halves(residual, there)):
             return fraction, trial, there
         fraction *= 0.5
     return None
+
+
+def _halves(residual: np.ndarray, there: np.ndarray) -> bool:
+    """Return whether the residual falls to half: near the minimum it says more than the energy, which is round-off."""
+    return bool(np.max(np.abs(there)) <= 0.5 * np.max(np.abs(residual)))
 
 
 def _largest(step: np.ndarray) -> float:

@@ -17,9 +17,9 @@ from fmus.jit import kernel
 
 POINT, WAVEFORM, HERMITE = 0, 1, 2
 
-# places in the inputs (42,)
-_MOTION, _MEANS, _ROTATION, _ROTATION_MEAN = 0, 24, 36, 39
-INPUT_SIZE = 42
+# places in the inputs (45,)
+_MOTION, _MEANS, _ROTATION, _ROTATION_MEAN, _CURVATURE = 0, 24, 36, 39, 42
+INPUT_SIZE = 45
 
 # places in the state
 LAST = 0  # 0:24 motion at the last communication point, as it came in
@@ -33,7 +33,8 @@ WORK_WHEEL = 31
 SLIDES = 32  # 1 if the bristle slides at the last communication point
 GONE = 33  # 1 once the cable has left the groove
 LAST_STEP = 34  # length of the last macro step, s
-STATE_SIZE = 35
+CURVATURE = 35  # 35:38 of the cable at the last communication point, 1/m
+STATE_SIZE = 38
 
 # places in the outputs
 O_CABLE, O_WHEEL = 0, 12  # each force, moment, force rate, moment rate
@@ -189,7 +190,7 @@ def _advance_bristle(prm, motion, trial, sample, z, slides):
 
 
 @kernel
-def sample_law(prm, path, h, nodes, weights, increments, end, z, motions, samples):
+def sample_law(prm, path, h, nodes, weights, increments, end, curvature, z, motions, samples):
     """Sample the law along a path and at the end motion.
 
     What friction dissipates is its work, in the same quadrature as the forces' work, less what the bristle stores: the
@@ -200,6 +201,7 @@ def sample_law(prm, path, h, nodes, weights, increments, end, z, motions, sample
     prm : the law's parameters; path : (4, 15); h : s
     nodes, weights, increments : of `gauss_rule(m)`
     end : (24,) motion at the end of the step
+    curvature : (3,) of the cable, 1/m
     z : (2,) bristle at the start; becomes that at the end
     motions, samples : (m + 1, 24) and (m + 1, 32), written
 
@@ -213,6 +215,7 @@ def sample_law(prm, path, h, nodes, weights, increments, end, z, motions, sample
     for j in range(24):
         motions[m, j] = end[j]
     for i in range(m + 1):
+        bend(motions[i], curvature)
         status = walls(prm, motions[i], samples[i])
         if status != OK:
             return status, 0.0
@@ -259,12 +262,30 @@ def _same(inputs, state, first, n):
 
 @kernel
 def start_motion(state, start):
-    """Write the last communication point's motion, its cable point moved along the tangent."""
+    """Write the last communication point's motion, its cable point moved along the cable."""
     for i in range(24):
         start[i] = state[LAST + i]
+    shift = state[SHIFT]
     for i in range(3):
-        start[i] += state[SHIFT] * start[3 + i]
-        start[6 + i] += state[SHIFT] * start[9 + i]
+        start[i] += shift * (start[3 + i] + 0.5 * shift * state[CURVATURE + i])
+        start[3 + i] += shift * state[CURVATURE + i]
+        start[6 + i] += shift * start[9 + i]
+
+
+@kernel
+def bend(motion, curvature):
+    """Turn the straight cable of a motion into the tangent of the curved one, at the foot of the wheel.
+
+    At the distance x of the foot from p the cable is at p + x t + x²/2 c and points along t + x c; the line through
+    that point is written as one through p - x²/2 c.
+    """
+    length, _u, offset, _d = foot(motion)
+    x = offset / length
+    if not math.isfinite(x):
+        return  # the law says what is wrong
+    for i in range(3):
+        motion[i] -= 0.5 * x * x * curvature[i]
+        motion[3 + i] += x * curvature[i]
 
 
 @kernel
@@ -395,9 +416,9 @@ def step(prm, method, inputs, h, nodes, weights, increments, state, path, motion
 
     Parameters
     ----------
-    prm : (14,); method : 0 point, 1 waveform, 2 hermite; inputs : (42,); h : s
+    prm : (14,); method : 0 point, 1 waveform, 2 hermite; inputs : (45,); h : s
     nodes, weights, increments : of `gauss_rule(m)`
-    state : (35,), advanced; outputs : (35,), written
+    state : (38,), advanced; outputs : (35,), written
     path, motions, samples : (4, 15), (m + 2, 24), (m + 1, 32) work space
 
     Returns
@@ -418,7 +439,7 @@ def step(prm, method, inputs, h, nodes, weights, increments, state, path, motion
         else:
             hermite_path(start, inputs, h, path)
         status, dissipated = sample_law(
-            prm, path, h, nodes, weights, increments, end, z, motions, samples
+            prm, path, h, nodes, weights, increments, end, inputs[_CURVATURE : _CURVATURE + 3], z, motions, samples
         )
     if status != OK:
         return status
@@ -455,6 +476,8 @@ def step(prm, method, inputs, h, nodes, weights, increments, state, path, motion
     state[LAST_STEP] = h
     for i in range(24):
         state[LAST + i] = end[i]
+    for i in range(3):
+        state[CURVATURE + i] = inputs[_CURVATURE + i]
     write_instant(last, outputs)
     write_memory(state, outputs)
     return OK

@@ -39,16 +39,12 @@ def _parameters() -> list[Variable]:
         ),
         real("exponent", "1", 2.5, "exponent n of the penetration"),
         real("damping", "s/m", 1.0, "Hunt-Crossley damping D, factor 1 + D * penetration rate"),
-        real(
-            "friction_coefficient", "1", 0.7, "Coulomb friction coefficient on the sum of both walls' forces"
-        ),
+        real("friction_coefficient", "1", 0.7, "Coulomb friction coefficient on the sum of both walls' forces"),
         real("wheel_radius", "m", 0.075, "radius of the wheel's rim"),
         real("groove_angle", "rad", 1.7453292519943295, "full opening angle of the groove"),
         real("groove_width", "m", 0.08, "width of the groove at the rim"),
         real("cable_diameter", "m", 0.018, "diameter of the cable"),
-        real(
-            "max_contact_length", "m", 0.06, "longest contact length l0; stiffness / l0 acts per unit length"
-        ),
+        real("max_contact_length", "m", 0.06, "longest contact length l0; stiffness / l0 acts per unit length"),
         real("tangential_stiffness", "N/m", 1e6, "stiffness of the friction bristle before it slides"),
         real("tangential_damping", "N.s/m", 1e3, "damping of the friction bristle before it slides"),
         real("initial.s", "m", 0.0, "arc length of the contact point on the unstretched cable at the start"),
@@ -84,6 +80,7 @@ def _inputs() -> list[Variable]:
         *rows("wheel.axle_mean", "1", "time mean of the axle over the macro step", across),
         *rows("wheel.rotation", "rad", "integral of the wheel's angular velocity over the macro step"),
         *rows("wheel.rotation_mean", "rad", "time mean of that running integral"),
+        *rows("cable.curvature", "1/m", "d²r/ds² of the cable at cable.s; zero: it counts as straight"),
     ]
 
 
@@ -133,7 +130,7 @@ def _outputs(motion: tuple[str, ...]) -> list[Variable]:
 def _table() -> VariableTable:
     inputs = _inputs()
     names = tuple(v.name for v in inputs)
-    motion = names[:24] + names[36:39]
+    motion = names[:24] + names[36:39] + names[42:45]
     return VariableTable([*_parameters(), *inputs, *_outputs(motion)])
 
 
@@ -143,7 +140,7 @@ class Contact:
     NAME = "contact"
     TITLE = "Hunt-Crossley contact of a grooved wheel with a cable"
     table = _table()
-    _INPUTS = slice(table.index["cable.position.x"], table.index["wheel.rotation_mean.z"] + 1)
+    _INPUTS = slice(table.index["cable.position.x"], table.index["cable.curvature.z"] + 1)
     _OUTPUTS = slice(table.index["cable.force.x"], table.index["work_wheel"] + 1)
 
     def __init__(self) -> None:
@@ -152,7 +149,7 @@ class Contact:
 
     def initialize(self, t: float) -> None:
         """Take over parameters and inputs; the bristle is relaxed, the outputs are the law's now."""
-        self._check_parameters()
+        self.check_parameters()
         self._prm = law_parameters(self.values, self.table)
         self._method = int(self._value("exchange"))
         self._nodes, self._weights, self._increments = exchange.gauss_rule(SAMPLES)
@@ -161,6 +158,7 @@ class Contact:
         self._samples = np.zeros((SAMPLES + 1, OUT_SIZE))
         self.state = np.zeros(exchange.STATE_SIZE)
         self.state[exchange.LAST : exchange.LAST + 24] = self.values[self._INPUTS][:24]
+        self.state[exchange.CURVATURE : exchange.CURVATURE + 3] = self.values[self._INPUTS][42:45]
         self.state[exchange.ARC] = self._value("initial.s")
         self.refresh()
         outputs = self.values[self._OUTPUTS]
@@ -181,9 +179,7 @@ class Contact:
     def step(self, t: float, h: float) -> None:
         """Advance from t to t + h; the inputs hold the motion at t + h and the means over the step."""
         if not h > 0.0:
-            raise ModuleError(
-                f"contact at t = {t:g} s: macro step {h:g} s must be positive; choose one above zero"
-            )
+            raise ModuleError(f"contact at t = {t:g} s: macro step {h:g} s must be positive; choose one above zero")
         status = exchange.step(
             self._prm,
             self._method,
@@ -203,7 +199,8 @@ class Contact:
     def _value(self, name: str) -> float:
         return float(self.values[self.table.index[name]])
 
-    def _check_parameters(self) -> None:
+    def check_parameters(self) -> None:
+        """Raise `ModuleError` naming the first parameter that makes no sense."""
         for name in (*_POSITIVE, *_NOT_NEGATIVE, "initial.s"):
             value = self._value(name)
             if not math.isfinite(value):
@@ -217,13 +214,9 @@ class Contact:
     def _check_groove(self) -> None:
         exponent, angle = self._value("exponent"), self._value("groove_angle")
         if exponent < 1.0:
-            raise ModuleError(
-                f"contact: exponent = {exponent:g} makes the wall infinitely stiff at touch; use >= 1"
-            )
+            raise ModuleError(f"contact: exponent = {exponent:g} makes the wall infinitely stiff at touch; use >= 1")
         if angle >= math.pi:
-            raise ModuleError(
-                f"contact: groove_angle = {angle:g} rad must be below pi; is it given in degrees?"
-            )
+            raise ModuleError(f"contact: groove_angle = {angle:g} rad must be below pi; is it given in degrees?")
         depth = 0.5 * self._value("groove_width") / math.tan(0.5 * angle)
         if depth >= self._value("wheel_radius"):
             raise ModuleError(
@@ -237,6 +230,4 @@ class Contact:
         if status == NO_AXLE:
             raise ModuleError(f"contact{when}: wheel.axle has no length; connect it to the robot's wheel")
         if status == NOT_FINITE:
-            raise ModuleError(
-                f"contact{when}: the motion of cable or wheel is not finite; take a smaller macro step"
-            )
+            raise ModuleError(f"contact{when}: the motion of cable or wheel is not finite; take a smaller macro step")

@@ -154,9 +154,7 @@ class Between:
         self.graph = graph
         self.start_values = graph.u.copy()
         self.places = {node.name: self._places(node, loads, torn) for node in graph.nodes}
-        self.rates = {
-            name: np.flatnonzero(np.isin(graph.rate_of, places)) for name, places in self.places.items()
-        }
+        self.rates = {name: np.flatnonzero(np.isin(graph.rate_of, places)) for name, places in self.places.items()}
 
     @staticmethod
     def _places(node: Node, loads: Loads, torn: bool) -> np.ndarray:

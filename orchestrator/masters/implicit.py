@@ -81,9 +81,7 @@ class Implicit(Master):
         self.predictor = Predictor(predictor)
         self.scale = Scale(graph, self.loads, absolute)
         self.places = graph.torn
-        self.control = (
-            StepControl(self, local_tolerance, absolute, max_depth) if local_tolerance > 0.0 else None
-        )
+        self.control = StepControl(self, local_tolerance, absolute, max_depth) if local_tolerance > 0.0 else None
 
     def start(self, t: float) -> None:
         """Prepare for the first step."""

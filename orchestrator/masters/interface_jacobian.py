@@ -115,9 +115,7 @@ class InterfaceJacobian(Implicit):
                 self._differentiate(model, t, H, x, states)
         return self._solve_interface(t, H, x, r, states)
 
-    def _solve_interface(
-        self, t: float, H: float, x: np.ndarray, r: np.ndarray, states: list[State]
-    ) -> np.ndarray:
+    def _solve_interface(self, t: float, H: float, x: np.ndarray, r: np.ndarray, states: list[State]) -> np.ndarray:
         inner, best = self.accelerator, (np.inf, x)
         inner.begin(H, self.scale.values)
         for _ in range(self.inner_iterations):

@@ -55,9 +55,7 @@ class ReducedInterface(Master):
         stuck = [node.name for node in self.rest if not node.fmu.capabilities.rollback]
         if stuck or not self.modelled or not self.rest:
             which = ", ".join(stuck) or "the graph"
-            raise GraphError(
-                f"master {self.NAME}: {which} cannot be iterated over; choose jacobi or gauss_seidel"
-            )
+            raise GraphError(f"master {self.NAME}: {which} cannot be iterated over; choose jacobi or gauss_seidel")
         loads = Loads(graph)
         self.scale = Scale(graph, loads, 1e-3)
         self.between = Between(graph, loads, torn=True)
@@ -130,9 +128,7 @@ class ReducedInterface(Master):
         report.residual = best[0]
         return best[1]
 
-    def _residual(
-        self, t: float, H: float, x: np.ndarray, y_hat: np.ndarray, states: list[State]
-    ) -> np.ndarray:
+    def _residual(self, t: float, H: float, x: np.ndarray, y_hat: np.ndarray, states: list[State]) -> np.ndarray:
         graph = self.graph
         graph.u[graph.torn] = x
         for node in self.modelled:
@@ -147,19 +143,14 @@ class ReducedInterface(Master):
     def _response(self, node: Node, t: float, H: float) -> np.ndarray:
         """Return the third differences of the pulse responses, (4, n_outputs, n_inputs)."""
         base = self._twin(node, t, H, -1)
-        h = (
-            np.array([self._twin(node, t, H, j) - base for j in range(len(node.inputs.names))])
-            / self.difference
-        )
+        h = np.array([self._twin(node, t, H, j) - base for j in range(len(node.inputs.names))]) / self.difference
         h = np.moveaxis(h, 0, 2)
         # what is interpolated is held at the mean of both ends: a change at one end makes half a pulse now,
         # half later
         places = self.between.places[node.name] - node.first
         later = np.concatenate([np.zeros_like(h[:1]), h[:-1]])
         h[:, :, places] = 0.5 * (h + later)[:, :, places]
-        return np.array(
-            [h[0], h[1] - 3 * h[0], h[2] - 3 * h[1] + 3 * h[0], h[3] - 3 * h[2] + 3 * h[1] - h[0]]
-        )
+        return np.array([h[0], h[1] - 3 * h[0], h[2] - 3 * h[1] + 3 * h[0], h[3] - 3 * h[2] + 3 * h[1] - h[0]])
 
     def _twin(self, node: Node, t: float, H: float, pulsed: int) -> np.ndarray:
         """Return the outputs of a twin after 1 … 4 steps, (4, n_outputs), one input pulsed in the first of

@@ -101,7 +101,7 @@ class Integrator:
 
     def advance(self, t: float, end: float) -> None:
         """Integrate from `t` to `end` with controlled steps; raises `ModuleError` if none is short enough."""
-        parts = self.refinement * np.ceil((end - t) / (self.refinement * self.longest) - 1e-9)
+        parts = self.refinement * max(1.0, np.ceil((end - t) / (self.refinement * self.longest) - 1e-9))
         self.control[kernels.LONGEST] = (end - t) / parts
         status, reached = kernels.advance(self.system, self.state, self.control, t, end, self.space, self.work)
         if status == kernels.OFF_CABLE:

@@ -11,7 +11,8 @@ from functools import cache
 from pathlib import Path
 
 import numpy as np
-from fmpy import platform_tuple
+from fmpy import platform, platform_tuple
+from fmpy.fmi2 import FMU2Model, FMU2Slave
 from fmpy.fmi3 import FMU3Model, FMU3ScheduledExecution, FMU3Slave
 from pythonfmu import FmuBuilder
 from scipy.linalg import expm
@@ -39,9 +40,7 @@ def build(name: str, *, rollback: bool = True) -> Path:
     if name == "wave":
         text = (SCRIPTS / "link_fmu.py").read_text(encoding="utf-8")
         script = folder / script.name
-        script.write_text(
-            text.replace("WAVE = False", "WAVE = True").replace("LinkTest", "WaveTest"), encoding="utf-8"
-        )
+        script.write_text(text.replace("WAVE = False", "WAVE = True").replace("LinkTest", "WaveTest"), encoding="utf-8")
     options = {**OPTIONS, "canGetAndSetFMUstate": rollback, "canSerializeFMUstate": rollback}
     return Path(FmuBuilder.build_FMU(str(script), dest=str(folder), **options))
 
@@ -52,23 +51,27 @@ def compiler() -> str | None:
 
 
 @cache
-def build_fmi3() -> Path:
-    """Compile the FMI 3.0 test FMU (Linux); return it."""
-    library, path = _folder() / "lag3.so", _folder() / "lag3.fmu"
-    text = (SCRIPTS / "lag3.c").read_text(encoding="utf-8")
-    rest = [n for n in dir(FMU3Slave) + dir(FMU3Model) + dir(FMU3ScheduledExecution) if n.startswith("fmi3")]
+def compiled(name: str) -> Path:
+    """Compile a test FMU in C, ``lag2`` (FMI 2.0) or ``lag3`` (FMI 3.0), on Linux; return it."""
+    library, path = _folder() / f"{name}.so", _folder() / f"{name}.fmu"
+    text = (SCRIPTS / f"{name}.c").read_text(encoding="utf-8")
+    prefix, interfaces = ("fmi2", [FMU2Slave, FMU2Model])
+    if name == "lag3":
+        prefix, interfaces = "fmi3", [FMU3Slave, FMU3Model, FMU3ScheduledExecution]
+    known = {n for interface in interfaces for n in dir(interface) if n.startswith(prefix)}
     # the standard wants every function there; those that are not used answer with an error
     text += "".join(
-        f"int {name}(void) {{ return 3; }}\n"
-        for name in sorted(set(rest))
-        if f" {name}(" not in text and f"*{name}(" not in text
+        f"int {function}(void) {{ return 3; }}\n"
+        for function in sorted(known)
+        if f" {function}(" not in text and f"*{function}(" not in text
     )
-    source = _folder() / "lag3.c"
+    source = _folder() / f"{name}.c"
     source.write_text(text, encoding="utf-8")
     subprocess.run([str(compiler()), "-shared", "-fPIC", "-O1", str(source), "-o", str(library)], check=True)
+    folder = platform if prefix == "fmi2" else platform_tuple
     with zipfile.ZipFile(path, "w") as archive:
-        archive.write(SCRIPTS / "lag3.xml", "modelDescription.xml")
-        archive.write(library, f"binaries/{platform_tuple}/lag3.so")
+        archive.write(SCRIPTS / f"{name}.xml", "modelDescription.xml")
+        archive.write(library, f"binaries/{folder}/{name}.so")
     return path
 
 
@@ -126,7 +129,7 @@ def oscillator_solution(
     return np.array([(expm(A * t) @ z0)[[0, 2]] for t in time])
 
 
-def chain(n: int, *, waveform: bool, stiffness: float = 200.0) -> Graph:
+def chain(n: int, *, waveform: bool, stiffness: float = 200.0, damping: float = 0.0) -> Graph:
     """Return `n` equal masses, each coupled to its left neighbour by a spring; the first one starts
     displaced."""
     components, connections = {}, []
@@ -137,6 +140,7 @@ def chain(n: int, *, waveform: bool, stiffness: float = 200.0) -> Graph:
             mass=1.0,
             ground_stiffness=10.0,
             stiffness=stiffness if i else 0.0,
+            damping=damping if i else 0.0,
             initial_position=0.0 if i else 0.1,
         )
     for i in range(1, n):
@@ -151,12 +155,11 @@ def chain(n: int, *, waveform: bool, stiffness: float = 200.0) -> Graph:
     return Graph(components, connections)
 
 
-def chain_solution(time: np.ndarray, n: int, stiffness: float = 200.0) -> np.ndarray:
+def chain_solution(time: np.ndarray, n: int, stiffness: float = 200.0, damping: float = 0.0) -> np.ndarray:
     """Return the positions of the chain, (len(time), n), from the matrix exponential."""
-    K = 10.0 * np.eye(n)
-    for i in range(1, n):
-        K[i - 1 : i + 1, i - 1 : i + 1] += stiffness * np.array([[1.0, -1.0], [-1.0, 1.0]])
-    A = np.block([[np.zeros((n, n)), np.eye(n)], [-K, np.zeros((n, n))]])
+    difference = np.diff(np.eye(n), axis=0)
+    K, C = 10.0 * np.eye(n) + stiffness * difference.T @ difference, damping * difference.T @ difference
+    A = np.block([[np.zeros((n, n)), np.eye(n)], [-K, -C]])
     z0 = np.zeros(2 * n)
     z0[0] = 0.1
     return np.array([(expm(A * t) @ z0)[:n] for t in time])

@@ -60,9 +60,7 @@ class LinkTest(Fmi2Slave):
         root = super().to_xml(model_options or {})
         units = Element("UnitDefinitions")
         for name, exponents in BASE.items():
-            SubElement(
-                SubElement(units, "Unit", name=name), "BaseUnit", {k: str(v) for k, v in exponents.items()}
-            )
+            SubElement(SubElement(units, "Unit", name=name), "BaseUnit", {k: str(v) for k, v in exponents.items()})
         root.insert(1, units)
         for variable, unit in zip(root.find("ModelVariables"), UNITS, strict=True):
             variable.find("Real").set("unit", unit)

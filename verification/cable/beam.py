@@ -1,7 +1,7 @@
 """Independent statics and small vibrations of a beam-cable in a vertical plane: no element, no code of `fmus`.
 
-The centreline r(s) has stretch λ and inclination θ: r' = λ (cos θ, sin θ). Energy per unstretched length is, with the
-strain measure of the project (Green–Lagrange) or engineering strain,
+The centreline r(s) has stretch λ and inclination θ: r' = λ (cos θ, sin θ). Energy per unstretched length is, with
+the strain measure of the project (Green–Lagrange) or engineering strain,
 
     W = EA/2 ((λ² - 1)/2)² + EI/2 (λ² θ')²      or      W = EA/2 (λ - 1)² + EI/2 θ'².
 
@@ -20,7 +20,7 @@ from dataclasses import dataclass
 import numpy as np
 from scipy.integrate import solve_bvp, solve_ivp
 from scipy.linalg import eigh
-from scipy.optimize import brentq, root
+from scipy.optimize import root, root_scalar
 
 TOLERANCE = 1e-9
 """Relative residual left by `solve_bvp`."""
@@ -59,7 +59,7 @@ class Beam:
 
 @dataclass(frozen=True)
 class Shape:
-    """An equilibrium: tension (H, V) at the left end, loads (arc length m, force down N), and the solution by segment."""
+    """An equilibrium: tension (H, V) at the left end, loads (arc length m, N downwards), the solution by segment."""
 
     beam: Beam
     h: float
@@ -91,9 +91,10 @@ class Shape:
 
 
 def chord_tension(beam: Beam, chord: float, extra: float = 0.0) -> float:
-    """Return the tension of the flat parabola: H/EA = chord/L - 1 + (W/H)²/24, W the weight and `extra` load (Irvine 1981)."""
+    """Return the tension of the flat parabola: H/EA = chord/L - 1 + (W/H)²/24, W with `extra` load (Irvine 1981)."""
     w = beam.weight * beam.length + extra
-    return brentq(lambda t: t / beam.ea - (chord / beam.length - 1.0) - (w / t) ** 2 / 24.0, 1e-6 * w, beam.ea + 10 * w)
+    bracket = (1e-6 * w, beam.ea + 10.0 * w)
+    return root_scalar(lambda t: t / beam.ea - (chord / beam.length - 1.0) - (w / t) ** 2 / 24.0, bracket=bracket).root
 
 
 def equilibrium(

@@ -47,7 +47,7 @@ class FreeBeam:
         return full[0], full[1]
 
     def bend(self, tip_force: np.ndarray, tip_moment: float, steps: int = 20) -> np.ndarray:
-        """Return the coordinates (n,) of a cantilever, clamped at the left with its strain free, under loads at its tip.
+        """Return the coordinates (n,) of a cantilever, clamped at the left with its strain free, loaded at its tip.
 
         The moment acts about x; its generalised force on g = r_x is M × g/|g|². Newton's method in load steps.
         """

@@ -1,12 +1,13 @@
 """Large rotations: a cantilever under a tip force, and one rolled up by a tip moment.
 
-L = 2 m, E = 2.07e11 Pa, 0.1 m × 0.1 m. Under the dead tip force 3 EI/L² the engineering-strain model gives the tip displacement
-(-0.508537304326, -1.207239854550) m; the value for this project's measures, Green–Lagrange strain and |r_x × r_xx|, follows
-from the same boundary-value problem by shooting (`verification/cable/beam.py`), which is checked against the former first.
+L = 2 m, E = 2.07e11 Pa, 0.1 m × 0.1 m. Under the dead tip force 3 EI/L² the engineering-strain model gives the tip
+displacement (-0.508537304326, -1.207239854550) m; the value for this project's measures, Green–Lagrange strain and
+|r_x × r_xx|, follows from the same boundary-value problem by shooting (`verification/cable/beam.py`), which is
+checked against the former first.
 
-Under a tip moment M the stretch λ and θ' are constant: ∂W/∂λ = 0 gives λ² (1 + 4 (EI/EA) θ'²) = 1, and M = EI λ⁴ θ'. With
-M = 2π EI/L a beam that cannot stretch rolls up into a circle; ours turns by θ' L, a little more, by a term that
-vanishes with the square of the depth over the radius.
+Under a tip moment M the stretch λ and θ' are constant: ∂W/∂λ = 0 gives λ² (1 + 4 (EI/EA) θ'²) = 1, and M = EI λ⁴
+θ'. With M = 2π EI/L a beam that cannot stretch rolls up into a circle; ours turns by θ' L, a little more, by a term
+that vanishes with the square of the depth over the radius.
 """
 
 from __future__ import annotations
@@ -15,7 +16,7 @@ from pathlib import Path
 
 import matplotlib.pyplot as plt
 import numpy as np
-from scipy.optimize import brentq
+from scipy.optimize import root_scalar
 
 from orchestrator.plots import COLOURS, STYLE
 from verification.cable.beam import Beam, cantilever
@@ -38,7 +39,8 @@ def rolled(n_elements: int, ea: float = EA) -> tuple[np.ndarray, np.ndarray]:
     """Return coordinates under the tip moment, and the exact (y, z, turn in rad) of the tip."""
     q = FreeBeam(LENGTH, ea, EI, n_elements).bend(np.zeros(3), MOMENT, steps=40)
     ratio = EI / ea
-    turn = brentq(lambda k: k - MOMENT / EI * (1.0 + 4.0 * ratio * k * k) ** 2, 0.0, 1.5 * MOMENT / EI)
+    bracket = (0.0, 1.5 * MOMENT / EI)
+    turn = root_scalar(lambda k: k - MOMENT / EI * (1.0 + 4.0 * ratio * k * k) ** 2, bracket=bracket).root
     stretch = 1.0 / np.sqrt(1.0 + 4.0 * ratio * turn**2)
     angle, radius = turn * LENGTH, stretch / turn
     return q, np.array([radius * np.sin(angle), radius * (1.0 - np.cos(angle)), angle])
@@ -88,7 +90,7 @@ def run(figures: Path) -> Result:
     """Refine both, draw the roll-up."""
     q, _ = rolled(64)
     with plt.rc_context(STYLE):
-        figure, ax = plt.subplots(figsize=(4.0, 3.2))
+        figure, ax = plt.subplots(figsize=(5.2, 3.0))
         for share, colour in zip((0.25, 0.5, 0.75), COLOURS, strict=False):
             p = FreeBeam(LENGTH, EA, EI, 32).bend(np.zeros(3), share * MOMENT, steps=20)
             ax.plot(p[1::6], p[2::6], color=colour, label=f"{share:g} · 2πEI/L")
@@ -96,7 +98,7 @@ def run(figures: Path) -> Result:
         ax.set_aspect("equal")
         ax.set_xlabel("y, m")
         ax.set_ylabel("z, m")
-        ax.legend()
+        ax.legend(loc="upper left", bbox_to_anchor=(1.0, 1.0))
         figure.savefig(figures / "cable_rollup.png")
         plt.close(figure)
     found = [*rows(64, 1e-8), *rolled_rows(64, 1e-5), order_row()]

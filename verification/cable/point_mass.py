@@ -1,16 +1,16 @@
 """A point mass on a taut cable: placed at rest under its weight, and striking it.
 
-Mass and cable are tied at a port: in every macro step the force and its slope are found with which position at the end and time
-mean of the position agree on both sides. The cable is weightless (`verification/cable/taut.py`), 199.8 m on a span of
-200 m.
+Mass and cable are tied at a port: in every macro step the force and its slope are found with which position at the
+end and time mean of the position agree on both sides. The cable is weightless (`verification/cable/taut.py`), 199.8
+m on a span of 200 m.
 
-(1) A mass of 38 kg with its weight, set on the cable at rest. Reference: modes of the tensioned beam with the mass, a series of
-sines with the mass as a matrix of rank one. The load is scaled to 1 N, so that the motion stays small.
+(1) A mass of 38 kg with its weight, set on the cable at rest. Reference: modes of the tensioned beam with the mass,
+a series of sines with the mass as a matrix of rank one. The load is scaled to 1 N, so that the motion stays small.
 (2) A mass that strikes at 1 mm/s and sticks. Until waves come back from the supports the cable is an infinite
-beam-string, whose impedance at a point is Z(p) = 2 √(ρA) √(T + 2 p √(ρA EI)) (from the roots of EI k⁴ - T k² + ρA p² = 0), and
-the mass has the velocity v₀ m/(m p + Z(p)) in the Laplace domain; its integral is inverted numerically (Talbot's contour; Weideman 2006).
-Heights are compared: the jump of the velocity leaves ripples of the mesh, below 1 %, in the velocity of the tied node. After
-0.25 s the first, fast bending waves come back.
+beam-string, whose impedance at a point is Z(p) = 2 √(ρA) √(T + 2 p √(ρA EI)) (from the roots of EI k⁴ - T k² + ρA
+p² = 0), and the mass has the velocity v₀ m/(m p + Z(p)) in the Laplace domain; its integral is inverted numerically
+(Talbot's contour; Weideman 2006). Heights are compared: the jump of the velocity leaves ripples of the mesh, below
+1 %, in the velocity of the tied node. After 0.25 s the first, fast bending waves come back.
 """
 
 from __future__ import annotations
@@ -104,11 +104,11 @@ def modal_height(theory: Taut, s: float, weight: float, times: np.ndarray, count
 
 
 def talbot(transform: Callable[[np.ndarray], np.ndarray], times: np.ndarray, n: int = 32) -> np.ndarray:
-    """Return the inverse Laplace transform at `times`: trapezoidal rule on Talbot's contour (Weideman 2006, SIAM J. Numer. Anal.)."""
+    """Return the inverse Laplace transform at `times`: trapezoidal rule on Talbot's contour (Weideman 2006)."""
     theta = (2.0 * np.arange(n) + 1.0) * np.pi / n - np.pi
     z = n * (0.5017 * theta / np.tan(0.6407 * theta) - 0.6122 + 0.2645j * theta)
     dz = n * (0.5017 / np.tan(0.6407 * theta) - 0.5017 * 0.6407 * theta / np.sin(0.6407 * theta) ** 2 + 0.2645j)
-    return np.array([(np.exp(z) * transform(z / t) * dz).sum() / (1j * n * t) for t in times]).real
+    return np.real([(np.exp(z) * transform(z / t) * dz).sum() / (1j * n * t) for t in times])
 
 
 def impact_height(theory: Taut, v0: float, times: np.ndarray) -> np.ndarray:

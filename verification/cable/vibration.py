@@ -1,11 +1,12 @@
 """Natural frequencies and damping ratios about the equilibrium, out of the vertical plane and in it.
 
 Three references. (1) Rayleigh–Ritz with polynomials on the second variation of the energy about the boundary-value
-solution (`verification/cable/beam.py`): the same mechanics, another method. (2) Irvine & Caughey 1974: a parabolic cable
-of small sag without bending stiffness; in plane, symmetric, tan(Ω/2) = Ω/2 - 4/λ² (Ω/2)³, λ² = (wL/H)² EA L/(H L_e), L_e = L (1 + (wL/H)²/8).
-It neglects terms of the square of the sag ratio: λ² = 24 is kept while the sag falls, and the difference must vanish
-with that square. (3) The tensioned beam, f_n = n/(2L) √(T/ρA) √(1 + n²π² EI/(T L²)), with Kelvin–Voigt damping
-ratio c EI β⁴/(2 ρA ω), β = nπ/L, as the tension is not damped; out of plane, where sag acts by its square only.
+solution (`verification/cable/beam.py`): the same mechanics, another method. (2) Irvine & Caughey 1974: a parabolic
+cable of small sag without bending stiffness; in plane, symmetric, tan(Ω/2) = Ω/2 - 4/λ² (Ω/2)³, λ² = (wL/H)² EA
+L/(H L_e), L_e = L (1 + (wL/H)²/8). It neglects terms of the square of the sag ratio: λ² = 24 is kept while the sag
+falls, and the difference must vanish with that square. (3) The tensioned beam, f_n = n/(2L) √(T/ρA) √(1 + n²π²
+EI/(T L²)), with Kelvin–Voigt damping ratio c EI β⁴/(2 ρA ω), β = nπ/L, as the tension is not damped; out of plane,
+where sag acts by its square only.
 """
 
 from __future__ import annotations
@@ -13,7 +14,7 @@ from __future__ import annotations
 from pathlib import Path
 
 import numpy as np
-from scipy.optimize import brentq
+from scipy.optimize import root_scalar
 
 from orchestrator.modes import CableModes, draw, modes
 from verification.cable import beam as reference
@@ -47,8 +48,9 @@ def irvine(settings: Settings, count: int) -> tuple[np.ndarray, np.ndarray]:
 
     def symmetric(k: int) -> float:
         low, high = (2 * k + 1e-9) * np.pi / 2.0, (2 * k + 1.0 - 1e-9) * np.pi / 2.0
-        x = brentq(lambda x: np.sin(x) - np.cos(x) * (x - 4.0 / parameter * x**3), low + np.pi / 2, high + np.pi / 2)
-        return x * unit / np.pi
+        bracket = (low + np.pi / 2, high + np.pi / 2)
+        x = root_scalar(lambda x: np.sin(x) - np.cos(x) * (x - 4.0 / parameter * x**3), bracket=bracket).root
+        return float(x * unit / np.pi)
 
     string = np.arange(1, count + 1) * unit / 2.0
     return string, np.sort(np.concatenate([[symmetric(k) for k in range(count)], string[1::2]]))[:count]
@@ -61,28 +63,30 @@ def flatter(factor: float) -> Settings:
 
 
 def irvine_rows(n_elements: int = 120) -> list[Row]:
-    """Return the difference from Irvine's frequencies at a sag of 1/1600 of the span, and the rate at which it vanishes."""
-    factors, differences = (4.0, 8.0, 16.0), []
-    for factor in factors:
-        settings = flatter(factor)
-        found = modes(cable(settings, n_elements=n_elements), 4)
-        out, plane = irvine(settings, 4)
-        differences.append(
-            max(
-                np.abs(found.out_of_plane.frequency / out - 1.0).max(),
-                np.abs(found.in_plane.frequency / plane - 1.0).max(),
-            )
-        )
-    result = []
-    for words, group, wanted in (("out of plane", found.out_of_plane, out), ("in plane", found.in_plane, plane)):
-        for k, (f, expected) in enumerate(zip(group.frequency, wanted, strict=True)):
-            label = f"λ² = 24, sag 1/{99 * 16:.0f}: {words}, mode {k + 1}, Hz"
-            result.append(Row(label, float(f), float(expected), "Irvine & Caughey 1974", 1e-4))
+    """Return how far we are from Irvine's frequencies at a sag of 1/1600 of the span, and the rate of that."""
+    factors, result = (4.0, 8.0, 16.0), []
+    series = [_beside_irvine(factor, n_elements) for factor in factors]
+    for label, f, expected in series[-1]:
+        name = f"λ² = 24, sag 1/{99 * factors[-1]:.0f}: {label}, Hz"
+        result.append(Row(name, f, expected, "Irvine & Caughey 1974", 1e-4))
+    differences = [max(abs(f / expected - 1.0) for _, f, expected in group) for group in series]
     order = -observed_order(factors, differences)
-    result.append(
-        Row("order in the sag of the difference from Irvine", order, 2.0, "neglected terms", 0.2, relative=False)
+    name = "order in the sag of the difference from Irvine"
+    return [*result, Row(name, order, 2.0, "neglected terms", 0.2, relative=False)]
+
+
+def _beside_irvine(factor: float, n_elements: int, count: int = 4) -> list[tuple[str, float, float]]:
+    """Return name, computed and expected frequency of the modes of a cable whose sag is smaller by `factor`."""
+    settings = flatter(factor)
+    found = modes(cable(settings, n_elements=n_elements), count)
+    groups = zip(
+        ("out of plane", "in plane"), (found.out_of_plane, found.in_plane), irvine(settings, count), strict=True
     )
-    return result
+    return [
+        (f"{words}, mode {k + 1}", float(group.frequency[k]), float(wanted[k]))
+        for words, group, wanted in groups
+        for k in range(count)
+    ]
 
 
 def direct_irvine_rows() -> list[Row]:

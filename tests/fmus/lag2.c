@@ -1,0 +1,55 @@
+/* Test FMU for FMI 2.0: x' = gain u, y = x; exact for held inputs. Compiled by tests and benchmarks where there is a compiler. */
+#include <stdlib.h>
+#include <string.h>
+
+typedef struct { double u, x, gain; } Lag;
+enum { VR_U = 1, VR_Y = 2, VR_GAIN = 3, VR_START = 4, OK = 0, ERROR = 3 };
+
+const char *fmi2GetVersion(void) { return "2.0"; }
+const char *fmi2GetTypesPlatform(void) { return "default"; }
+void *fmi2Instantiate(const char *name, int type, const char *guid, const char *path, const void *callbacks, int visible,
+                      int logging) {
+    Lag *lag = calloc(1, sizeof(Lag));
+    lag->gain = 1.0;
+    return lag;
+}
+void fmi2FreeInstance(void *c) { free(c); }
+int fmi2SetDebugLogging(void *c, int on, size_t n, const char *const categories[]) { return OK; }
+int fmi2SetupExperiment(void *c, int t, double tolerance, double start, int s, double stop) { return OK; }
+int fmi2EnterInitializationMode(void *c) { return OK; }
+int fmi2ExitInitializationMode(void *c) { return OK; }
+int fmi2Terminate(void *c) { return OK; }
+int fmi2Reset(void *c) { return OK; }
+int fmi2GetReal(void *c, const unsigned vr[], size_t n, double values[]) {
+    Lag *lag = c;
+    for (size_t i = 0; i < n; i++) {
+        if (vr[i] == VR_Y) values[i] = lag->x;
+        else if (vr[i] == VR_U) values[i] = lag->u;
+        else if (vr[i] == VR_GAIN) values[i] = lag->gain;
+        else if (vr[i] == VR_START) values[i] = lag->x;
+        else return ERROR;
+    }
+    return OK;
+}
+int fmi2SetReal(void *c, const unsigned vr[], size_t n, const double values[]) {
+    Lag *lag = c;
+    for (size_t i = 0; i < n; i++) {
+        if (vr[i] == VR_U) lag->u = values[i];
+        else if (vr[i] == VR_GAIN) lag->gain = values[i];
+        else if (vr[i] == VR_START) lag->x = values[i];
+        else return ERROR;
+    }
+    return OK;
+}
+int fmi2DoStep(void *c, double t, double h, int no_rollback) {
+    Lag *lag = c;
+    lag->x += h * lag->gain * lag->u;
+    return OK;
+}
+int fmi2GetFMUstate(void *c, void **state) {
+    if (!*state) *state = malloc(sizeof(Lag));
+    memcpy(*state, c, sizeof(Lag));
+    return OK;
+}
+int fmi2SetFMUstate(void *c, void *state) { memcpy(c, state, sizeof(Lag)); return OK; }
+int fmi2FreeFMUstate(void *c, void **state) { free(*state); *state = NULL; return OK; }

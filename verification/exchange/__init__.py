@@ -1,0 +1,7 @@
+"""Studies of the exchange between the FMUs within a macro step."""
+
+from types import ModuleType
+
+from verification.exchange import drop, moments, smooth
+
+STUDIES: tuple[ModuleType, ...] = (moments, smooth, drop)

@@ -1,0 +1,7 @@
+"""Studies of the whole system: cable, robot and contact together, coupled and monolithic."""
+
+from types import ModuleType
+
+from verification.system import convergence, energy, estimate, friction
+
+STUDIES: tuple[ModuleType, ...] = (energy, estimate, convergence, friction)
