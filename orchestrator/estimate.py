@@ -27,7 +27,8 @@ def divisor(scenario: Scenario, exchange: str) -> float:
     """Return what the difference between both runs is divided by.
 
     `waveform` has order 4 where the motion is smooth and about 2 where touch, lift-off or slip falls inside a step: p
-    is taken as 3. Other implicit coupling, of values at an instant, has order 2. For explicit coupling, of order 1 at least, the difference is taken as it is.
+    is taken as 3. Other implicit coupling, of values at an instant, has order 2. For explicit coupling, of order 1 at
+    least, the difference is taken as it is.
     """
     if not MASTERS[scenario.simulation.master].IMPLICIT:
         return 1.0
