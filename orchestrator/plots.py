@@ -313,7 +313,8 @@ def energy(path: Path, audit: Audit) -> None:
             drift.semilogy(audit.time, _above_zero(values), color=colour, linewidth=0.8, label=name)
         if np.isfinite(audit.allowed):
             drift.axhline(audit.allowed, color=GREY, linewidth=0.9, linestyle=":", label="allowed")
-        drift.set_ylim(1e-5 * max(float(np.max(residual)), 1e-12), 10.0 * max(float(np.max(residual)), 1e-12))
+        peak = max(float(np.max(residual)), 1e-12)
+        drift.set_ylim(1e-4 * peak, 3.0 * max(peak, audit.allowed if np.isfinite(audit.allowed) else 0.0))
         drift.set_ylabel("|Drift| [J]")
         drift.set_xlabel("Time [s]")
         for axis in (terms, drift):
