@@ -1,8 +1,9 @@
 """The error of a coupled run, estimated without a reference: the run is repeated with everything coarser.
 
-Macro step and inner steps are doubled and the tolerances of the iteration raised, so that each of the errors grows; the
-largest difference between both runs over (2^p - 1) then estimates the error of the finer one (Richardson's rule). p is
-not measured by a third run: on the landings that predicts worse (docs/estimate.md).
+Macro step and inner steps are doubled and the tolerances of the iteration raised, so that each of the errors grows;
+the largest difference between both runs over a divisor, 2^p - 1 for an error of order p, then estimates the error of
+the finer one (Richardson's rule). p is not measured by a third run: on the landings that predicts worse
+(docs/estimate.md).
 """
 
 from __future__ import annotations
@@ -22,15 +23,16 @@ local error of order 5 as by doubled sub-steps."""
 INNER_STEP = "integration_step"
 
 
-def order(scenario: Scenario, exchange: str) -> int:
-    """Return p.
+def divisor(scenario: Scenario, exchange: str) -> float:
+    """Return what the difference between both runs is divided by.
 
-    `waveform` has order 4 where the motion is smooth and about 2 where touch, lift-off or slip falls inside a step: 3.
-    Other implicit coupling holds values at an instant: 2. Explicit coupling: 1, that is, the difference as it is.
+    `waveform` has order 4 where the motion is smooth and about 2 where touch, lift-off or slip falls inside a step: p
+    is taken as 3. Other implicit coupling, of values at an instant, has order 2. For explicit coupling, of order 1 at
+    least, the difference is taken as it is.
     """
     if not MASTERS[scenario.simulation.master].IMPLICIT:
-        return 1
-    return 3 if exchange == "waveform" else 2
+        return 1.0
+    return 7.0 if exchange == "waveform" else 3.0
 
 
 def coarser(scenario: Scenario) -> Scenario | None:
@@ -58,11 +60,11 @@ def _inner_steps(scenario: Scenario) -> Iterator[tuple[CableSection | RobotSecti
             yield section, float(vocabulary.of_module(name)[INNER_STEP].start)
 
 
-def estimated_error(fine: Table, coarse: Table, p: int) -> dict[str, float]:
+def estimated_error(fine: Table, coarse: Table, divisor: float) -> dict[str, float]:
     """Return the estimated largest error of every signal of `fine`, in its unit; every other row is in `coarse`."""
     rows = slice(0, 2 * len(coarse["time"]) - 1, 2)
     return {
-        name: float(np.max(np.abs(values[rows] - coarse[name]))) / (2**p - 1)
+        name: float(np.max(np.abs(values[rows] - coarse[name]))) / divisor
         for name, values in fine.items()
         if name in coarse and name != "time"
     }

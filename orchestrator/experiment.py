@@ -27,7 +27,7 @@ from orchestrator.compare import (
 )
 from orchestrator.contract import BREAKS, check_variables
 from orchestrator.errors import InputError, RunError
-from orchestrator.estimate import coarser, estimated_error, order
+from orchestrator.estimate import coarser, divisor, estimated_error
 from orchestrator.fmu import Fmu, FmuError
 from orchestrator.graph import Connection, Graph
 from orchestrator.masters import MASTERS, StepReport
@@ -221,8 +221,8 @@ def estimate(coupled: Coupled, progress: Progress = lambda _: None) -> None:
     except RunError:
         found: dict[str, float] = {}
     else:
-        p = order(scenario, coupled.exchange)
-        found = {} if other.log.error is not None else estimated_error(coupled.table, other.table, p)
+        by = divisor(scenario, coupled.exchange)
+        found = {} if other.log.error is not None else estimated_error(coupled.table, other.table, by)
     signals = [name for name in scenario.simulation.tolerances if name in coupled.table]
     coupled.estimated_error = {name: found.get(name, float("nan")) for name in signals}
 

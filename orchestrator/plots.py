@@ -206,13 +206,18 @@ def work_precision(path: Path, comparison: Comparison) -> None:
         axes = figure.subplots(len(signals), 2, sharex="col", sharey="row", squeeze=False)
         for row, signal in zip(axes, signals, strict=True):
             for i, master in enumerate(masters):
-                style = {"color": COLOURS[i % 6], "marker": MARKERS[(i + i // 6) % 6], "label": master}
+                style = {"color": COLOURS[i % 6], "marker": MARKERS[(i + i // 6) % 6], "markersize": 4.5}
+                style |= {"label": master, "linestyle": "-" if i < 6 else "--"}
                 runs = sorted((r for r in comparison.runs if r.master == master), key=lambda r: r.macro_step)
                 runs = [r for r in runs if signal in r.signals and np.isfinite(r.signals[signal].relative_max_error)]
                 values = _above_zero(np.array([r.signals[signal].relative_max_error for r in runs]))
-                row[0].loglog([r.wall_s for r in runs], values, markersize=4.5, **style)
-                row[1].loglog([r.cable_steps for r in runs], values, markersize=4.5, **style)
+                row[0].loglog([r.wall_s for r in runs], values, **style)
+                row[1].loglog([r.cable_steps for r in runs], values, **style)
             row[0].set_ylabel(f"Relative error, {_words(signal)} [–]")
+        for axis in axes[-1]:
+            axis.xaxis.set_major_locator(LogLocator(subs=(1.0, 2.0, 5.0)))
+            axis.xaxis.set_major_formatter("{x:g}")
+            axis.xaxis.set_minor_locator(NullLocator())
         axes[-1][0].set_xlabel("Wall time [s]")
         axes[-1][1].set_xlabel("Cable solves [–]")
         figure.legend(*axes[0][0].get_legend_handles_labels(), loc="outside upper center", ncols=min(4, len(masters)))

@@ -8,10 +8,13 @@ from __future__ import annotations
 import numpy as np
 import pytest
 
+from orchestrator import estimate, experiment
 from orchestrator.graph import Connection, Graph
 from orchestrator.masters.step_control import SAFETY, StepControl
+from orchestrator.scenario import load
 from orchestrator.simulation import Log
 from tests.fmus import fmu
+from tests.test_cli import LANDING, OSCILLATOR, exact_oscillator
 from tests.test_masters import ITERATED, run
 
 RECORD = ["a.position", "a.velocity", "b.position", "b.velocity"]
@@ -78,8 +81,8 @@ def controlled(master: str = "iqn_ils", **options) -> Log:
 
 @pytest.mark.parametrize("master", ["iqn_ils", "interface_jacobian"])
 def test_adaptive_error_follows_the_tolerance(master):
-    """Local errors below the tolerance but in the first step, whose range to measure by begins at zero; the global error
-    goes down with the tolerance."""
+    """Local errors are below the tolerance, but in the first step, whose range to measure by begins at zero; the global
+    error goes down with the tolerance."""
     exact = controlled(master, local_tolerance=1e-9).values[:, [0, 2]]
     errors = []
     for tolerance in (1e-4, 1e-6):
@@ -108,3 +111,41 @@ def test_controller_finds_the_length_that_the_error_allows():
         lengths.append(wanted)
     assert lengths[-1] == pytest.approx(8e-3 * SAFETY ** (1 / 5), rel=0.02)
     assert max(lengths) < 1.3 * lengths[-1]
+
+
+@pytest.mark.parametrize(("master", "H"), [("iqn_ils", 0.02), ("iqn_ils", 0.005), ("gauss_seidel", 0.002)])
+def test_estimate_of_the_oscillator_is_within_a_factor_three(master, H):
+    """Against the exponential of the 4 x 4 matrix; the order is the declared one, so the rule is nearly exact."""
+    scenario = load(OSCILLATOR, [f"simulation.macro_step={H}", "simulation.stop_time=2.0"], master=master)
+    coupled = experiment.run(scenario)
+    experiment.estimate(coupled)
+    exact = dict(zip(("left.position", "right.position"), exact_oscillator(coupled.table["time"]), strict=True))
+    assert list(coupled.estimated_error) == list(exact)
+    for name, values in exact.items():
+        error = np.max(np.abs(coupled.table[name] - values))
+        assert 1 / 3 < coupled.estimated_error[name] / error < 3
+    assert experiment.summary(coupled)["estimated_error"] == coupled.estimated_error
+
+
+def test_everything_is_coarser():
+    scenario = load(LANDING, ["simulation.stop_time=0.055", "master.local_tolerance=1e-6"])
+    coarse = estimate.coarser(scenario)
+    assert coarse is not None and coarse.cable is not None and coarse.robot is not None
+    assert (coarse.simulation.macro_step, coarse.simulation.stop_time) == (0.01, 0.05)  # eleven steps: one is left over
+    assert coarse.cable.parameters["integration_step"] == 0.0025
+    assert coarse.robot.parameters["integration_step"] == 0.002  # twice the default of the robot's table
+    assert coarse.master == {"tolerance": pytest.approx(1e-5), "local_tolerance": pytest.approx(3.2e-5)}
+    assert scenario.cable is not None and scenario.cable.parameters["integration_step"] == 0.00125
+    assert estimate.coarser(scenario.changed(stop_time=0.015)) is None
+
+
+def test_difference_of_tables_by_hand():
+    fine = {"time": np.arange(6.0), "x": np.array([0.0, 9.0, 1.0, 9.0, 2.0, 9.0])}
+    coarse = {"time": np.array([0.0, 2.0, 4.0]), "x": np.array([0.0, 1.5, 2.7])}
+    assert estimate.estimated_error(fine, coarse, 7.0) == {"x": pytest.approx(0.1)}
+
+
+def test_no_estimate_where_none_is_asked_for():
+    coupled = experiment.run(load(OSCILLATOR, ["simulation.stop_time=0.1", "simulation.estimate=none"]))
+    experiment.estimate(coupled)
+    assert coupled.estimated_error == {}

@@ -178,8 +178,10 @@ def run(figures: Path) -> Result:
 def _draw(path: Path, times: np.ndarray, history: np.ndarray) -> None:
     with plt.rc_context(STYLE):
         figure, (left, right) = plt.subplots(1, 2, figsize=(7.0, 3.0))
+        counts = (16, 32, 64, 128)
+        steps = [MACRO_STEP / n for n in counts]
         for method, colour in zip(METHODS, COLOURS, strict=False):
-            steps, errors, _ = order(method, (16, 32, 64, 128))
+            _, errors, _ = order(method, counts)
             left.loglog(steps, errors, "o-", markersize=4, color=colour, label=method)
         left.set_xticks(steps, [f"{1e3 * h:g}" for h in steps], minor=False)
         left.minorticks_off()

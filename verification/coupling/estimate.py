@@ -2,8 +2,8 @@
 
 Six landings over 1.2 s; `iqn_ils` and `interface_jacobian` at 20, 10, 5 and 2.5 ms, `gauss_seidel` at 0.5 and 0.25 ms
 (it is unstable beyond about 1 ms). The true error is the largest difference from the monolithic solution, whose own
-error is estimated at 1e-9 m and 1e-8 rad or less; a case whose error is not ten times that is left out, and so is the roll at
-midspan, which is zero by symmetry. Counted as right is an estimate within a factor 3.
+error is estimated at 1e-9 m and 1e-8 rad or less; a case whose error is not ten times that is left out, and so is the
+roll at midspan, which is zero by symmetry. Counted as right is an estimate within a factor 3.
 """
 
 from __future__ import annotations
