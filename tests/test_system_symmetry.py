@@ -39,8 +39,9 @@ def test_midspan_gives_no_roll(kind):
 @pytest.mark.parametrize("kind", ["coupled", "monolithic"])
 def test_mirrored_landing_points(kind):
     """20 m and 180 m: the same height, roll and lateral axis reversed. The nodes of the mesh are mirrored to 1e-12."""
-    left = run(kind, scenario(stop=0.5))
-    right = run(kind, scenario(stop=0.5, landing__position=180.0, **{"cable.parameters.grading_position": 180.0}))
+    left = run(kind, scenario(stop=0.5, master__tolerance=1e-8))
+    moved = {"landing.position": 180.0, "cable.parameters.grading_position": 180.0}
+    right = run(kind, scenario(stop=0.5, master__tolerance=1e-8, **moved))
     assert np.max(np.abs(left["robot.roll"])) > 1e-3
     tolerance = ITERATION if kind == "coupled" else ROUND_OFF
     for name, sign, offset in (("body.position.z", 1, 0), ("body.position.y", -1, 200), ("roll", -1, 0)):
@@ -52,7 +53,8 @@ def test_mirrored_landing_points(kind):
 def test_mirrored_in_x(kind):
     """A push to one side and to the other, with the yaw to match."""
     push = {"robot.parameters.initial.velocity.x": 0.05, "robot.parameters.initial.yaw": 0.03}
-    one, other = (run(kind, scenario(stop=0.5, **{k: s * v for k, v in push.items()})) for s in (1, -1))
+    pushed = [{k: s * v for k, v in push.items()} for s in (1, -1)]
+    one, other = (run(kind, scenario(stop=0.5, master__tolerance=1e-8, **push)) for push in pushed)
     assert np.max(np.abs(one["robot.body.position.x"])) > 1e-3
     tolerance = ITERATION if kind == "coupled" else ROUND_OFF
     signs = {"body.position.x": -1, "body.position.y": 1, "body.position.z": 1, "roll": 1, "pitch": -1, "yaw": -1}
