@@ -34,7 +34,6 @@ class Collocation(NamedTuple):
     eigenvalue : () complex λ of a, the other one being its conjugate
     to_mode, from_mode : (2,) complex, r ↦ to_mode·r and w ↦ 2 Re(from_mode w): the change to the eigenvector of λ
         and back
-    extrapolate : (2, 2), stage accelerations of the next step of equal length on the line through those of this one
     end : (2,), acceleration at the end of the step on that line
     """
 
@@ -46,7 +45,6 @@ class Collocation(NamedTuple):
     eigenvalue: complex
     to_mode: np.ndarray
     from_mode: np.ndarray
-    extrapolate: np.ndarray
     end: np.ndarray
 
 
@@ -71,7 +69,6 @@ def collocation(spectral_radius: float) -> Collocation:
         eigenvalue=complex(values[k]),
         to_mode=np.ascontiguousarray(inverse[0]),
         from_mode=np.ascontiguousarray(vectors[:, k]),
-        extrapolate=np.vander(1.0 + c, 2, increasing=True) @ line,
         end=np.array([1.0, 1.0]) @ line,
     )
 

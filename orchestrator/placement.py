@@ -12,6 +12,7 @@ from scipy.optimize import least_squares, root_scalar
 
 from fmus.cable.assembly import interpolate
 from fmus.cable.module import Cable
+from fmus.contact.law import PARAMETERS, law_parameters
 from fmus.contact.module import Contact
 from fmus.robot.module import Robot
 from fmus.rotations import from_euler, rotate
@@ -28,10 +29,9 @@ class Placement:
 
 def touching_distance(contact: Contact) -> float:
     """Return the distance (m) of wheel centre and centreline at which both walls touch: R_b + d_c / (2 sin(θ/2))."""
-    prm = dict(zip(contact.table.names("parameter"), contact.values, strict=False))
-    half = 0.5 * prm["groove_angle"]
-    apex = prm["wheel_radius"] - 0.5 * prm["groove_width"] / np.tan(half)
-    return float(apex + 0.5 * prm["cable_diameter"] / np.sin(half))
+    prm = law_parameters(contact.values, contact.table)
+    sine, apex = prm[-3], prm[-1]
+    return float(apex + 0.5 * prm[PARAMETERS.index("cable_diameter")] / sine)
 
 
 def place(
@@ -75,9 +75,8 @@ def place(
 
     start = np.array([position, _height(cable, position) + distance - np.mean(mounts[:, 2]), 0.0])
     found = least_squares(misfit, start, xtol=1e-15, ftol=1e-15, gtol=1e-15, x_scale=[1.0, 1.0, 0.1]).x
-    gap = min(_foot(cable, centre)[1] - distance for centre in centres(found))
-    if found.size and robot.n_wheels > 2:
-        found[1] -= gap
+    if robot.n_wheels > 2:  # roll and height cannot make all of them touch: no wheel may start pressed in
+        found[1] -= min(_foot(cable, centre)[1] - distance for centre in centres(found))
     feet = [_foot(cable, centre) for centre in centres(found)]
     lateral = float(np.mean(centres(found)[:, 0]))
     initial = {

@@ -50,7 +50,7 @@ class Solution:
     ----------
     time : (n,) s
     signals : ``component.variable`` → (n,); components are cable, robot, contact1 …
-    wall_s : wall time of the solution returned, warm; `wall_estimate_s` that of the coarser one besides
+    wall_s : wall time of the solution returned, warm
     steps : number of steps
     tolerance : local tolerance, m
     estimated_error : signal → largest difference from the solution with steps twice as long, unit of the signal
@@ -61,7 +61,6 @@ class Solution:
     wall_s: float
     steps: int
     tolerance: float
-    wall_estimate_s: float = 0.0
     estimated_error: dict[str, float] = field(default_factory=dict)
 
 
@@ -236,7 +235,6 @@ def solve(
     if not estimate:
         return fine
     coarse = integrate(make, times, 16.0 * tolerance, progress)
-    fine.wall_estimate_s = coarse.wall_s
     fine.estimated_error = {
         name: float(np.max(np.abs(values - coarse.signals[name]))) for name, values in fine.signals.items()
     }
