@@ -8,7 +8,7 @@ real and complex matrices alike.
 
 from __future__ import annotations
 
-from fmus.jit import kernel
+from fmus.jit import kernel, summing_kernel
 
 
 @kernel
@@ -32,7 +32,7 @@ def factorise(band):
     return 0
 
 
-@kernel
+@summing_kernel
 def solve(band, x):
     """Overwrite `x` (n,) with the solution of the system factorised in `band`."""
     n = band.shape[0]

@@ -50,14 +50,16 @@ def coarser(scenario: Scenario) -> Scenario | None:
 
 
 def _inner_steps(scenario: Scenario) -> Iterator[tuple[CableSection | RobotSection | Component, float]]:
-    """Yield the sections of all components that have an inner step, and that step, s."""
-    ours: dict[str, CableSection | RobotSection | None] = {"cable": scenario.cable, "robot": scenario.robot}
-    for section in (*ours.values(), *scenario.components.values()):
+    """Yield the sections of all components that have an inner step of their own, and that step, s.
+
+    That of our cable follows the macro step where the scenario gives none (`orchestrator.landing`).
+    """
+    for section in (scenario.cable, scenario.robot, *scenario.components.values()):
         if section is not None and INNER_STEP in section.parameters:
             yield section, float(section.parameters[INNER_STEP])
-    for name, section in ours.items():
-        if section is not None and section.fmu is None and INNER_STEP not in section.parameters:
-            yield section, float(vocabulary.of_module(name)[INNER_STEP].start)
+    robot = scenario.robot
+    if robot is not None and robot.fmu is None and INNER_STEP not in robot.parameters:
+        yield robot, float(vocabulary.of_module("robot")[INNER_STEP].start)
 
 
 def estimated_error(fine: Table, coarse: Table, divisor: float) -> dict[str, float]:

@@ -132,10 +132,9 @@ def test_everything_is_coarser():
     coarse = estimate.coarser(scenario)
     assert coarse is not None and coarse.cable is not None and coarse.robot is not None
     assert (coarse.simulation.macro_step, coarse.simulation.stop_time) == (0.01, 0.05)  # eleven steps: one is left over
-    assert coarse.cable.parameters["integration_step"] == 0.0025
+    assert "integration_step" not in coarse.cable.parameters  # it follows the macro step
     assert coarse.robot.parameters["integration_step"] == 0.002  # twice the default of the robot's table
-    assert coarse.master == {"tolerance": pytest.approx(1e-5), "local_tolerance": pytest.approx(3.2e-5)}
-    assert scenario.cable is not None and scenario.cable.parameters["integration_step"] == 0.00125
+    assert coarse.master == {"tolerance": pytest.approx(3e-5), "local_tolerance": pytest.approx(3.2e-5)}
     assert estimate.coarser(scenario.changed(stop_time=0.015)) is None
 
 

@@ -57,6 +57,8 @@ class Work(NamedTuple):
     external: np.ndarray
     increment: np.ndarray
     band: np.ndarray
+    late_band: np.ndarray
+    late: np.ndarray
     matrix: np.ndarray
     mode: np.ndarray
     real_band: np.ndarray
@@ -86,12 +88,14 @@ def make_work(n: int, state_size: int) -> Work:
         external=np.zeros(n),
         increment=np.zeros(n),
         band=np.zeros((n, width), dtype=np.complex128),
+        late_band=np.zeros((n, width), dtype=np.complex128),
+        late=np.zeros(1, dtype=np.bool_),
         matrix=np.zeros((13, 12), dtype=np.complex128),
         mode=np.zeros(n, dtype=np.complex128),
         real_band=np.zeros((n, width)),
         real_matrix=np.zeros((13, 12)),
         mass_band=np.zeros((n, width)),
-        key=np.full(2 * n + 1, np.nan),
+        key=np.full(2 * n + 2, np.nan),
         load=np.zeros((2, 3)),
         point=np.zeros((2, 6)),
         start=np.zeros((N_PORTS, 12)),
@@ -168,10 +172,10 @@ def _finished(change, rate, tolerance):
 
 
 @kernel
-def _same_key(key, q, v, h):
-    """Return whether the factors kept were made from this state and step."""
+def _same_key(key, q, v, h, ahead):
+    """Return whether the factors kept were made from this state, step and look-ahead."""
     n = q.size
-    if key[2 * n] != h:
+    if key[2 * n] != h or key[2 * n + 1] != ahead:
         return False
     for i in range(n):
         if key[i] != q[i] or key[n + i] != v[i]:
@@ -180,22 +184,35 @@ def _same_key(key, q, v, h):
 
 
 @kernel
-def _collocation_matrix(model, method, q, v, h, work):
-    """Factorise M + h λ C + h² λ² K at (q, v), unless that is what the factors were made of; return the status."""
-    if _same_key(work.key, q, v, h):
+def _collocation_matrix(model, method, q, v, h, band, work):
+    """Write the factors of M + h λ C + h² λ² K at (q, v) to `band`; return the status."""
+    z = h * method.eigenvalue
+    iteration_matrix(model, q, v, 1.0 + 0.0j, z, z * z, band, work.matrix, work.element)
+    return banded.factorise(band)
+
+
+@kernel
+def _first_matrix(model, method, q, v, a, h, ahead, work):
+    """Make ready the factors for steps `h` from (q, v) on, unless they were made of just that; return the status.
+
+    The tangent is taken `ahead` seconds later, on the parabola with the acceleration `a`: in the middle of the steps
+    that it is to serve it contracts best. The factors are a function of the start alone.
+    """
+    work.late[0] = False
+    if _same_key(work.key, q, v, h, ahead):
         return OK
     n = q.size
     for i in range(n):
         work.key[i] = q[i]
         work.key[n + i] = v[i]
-    work.key[2 * n] = h
-    z = h * method.eigenvalue
-    iteration_matrix(model, q, v, 1.0 + 0.0j, z, z * z, work.band, work.matrix, work.element)
-    return banded.factorise(work.band)
+        work.q[1, i] = q[i] + ahead * (v[i] + 0.5 * ahead * a[i])
+        work.v[1, i] = v[i] + ahead * a[i]
+    work.key[2 * n], work.key[2 * n + 1] = h, ahead
+    return _collocation_matrix(model, method, work.q[1], work.v[1], h, work.band, work)
 
 
 @kernel
-def collocation_step(model, method, state, h, offset, ports, tolerance, fresh, work):
+def collocation_step(model, method, state, h, offset, ports, tolerance, ahead, work):
     """Advance the flat `state` by one inner step `h` of two-stage collocation.
 
     Parameters
@@ -203,7 +220,7 @@ def collocation_step(model, method, state, h, offset, ports, tolerance, fresh, w
     offset : start of the step relative to the middle of the macro step, s
     ports : (N_PORTS, 13) s, force, moment, force rate, moment rate of each port
     tolerance : m, of a coordinate
-    fresh : whether the iteration matrix is made at the start of this step
+    ahead : s, negative: go on with the iteration matrix of the step before; else one is made for so much later
 
     Returns
     -------
@@ -216,7 +233,7 @@ def collocation_step(model, method, state, h, offset, ports, tolerance, fresh, w
         slope = (a[1, i] - a[0, i]) / (method.c[1] - method.c[0])
         for j in range(2):
             work.a[j, i] = a[0, i] + slope * (1.0 + ratio * method.c[j] - method.c[0]) if ratio > 0.0 else a[1, i]
-    if fresh and _collocation_matrix(model, method, q0, v0, h, work) != OK:
+    if ahead >= 0.0 and _first_matrix(model, method, q0, v0, a[1], h, ahead, work) != OK:
         return NOT_CONVERGED
     previous = np.inf
     scale = h * h * abs(method.eigenvalue) ** 2
@@ -242,7 +259,7 @@ def collocation_step(model, method, state, h, offset, ports, tolerance, fresh, w
             constrain_vector(model, work.residual[j])
         for i in range(n):
             work.mode[i] = -(method.to_mode[0] * work.residual[0, i] + method.to_mode[1] * work.residual[1, i])
-        banded.solve(work.band, work.mode)
+        banded.solve(work.late_band if work.late[0] else work.band, work.mode)
         change = 0.0
         for i in range(n):
             for j in range(2):
@@ -257,7 +274,8 @@ def collocation_step(model, method, state, h, offset, ports, tolerance, fresh, w
         if rate > SLOW and iteration > 0:
             if change < 100.0 * tolerance and rate > 0.9:
                 break  # round-off
-            if _collocation_matrix(model, method, work.q[1], work.v[1], h, work) != OK:
+            work.late[0] = True  # the factors made at the start are kept for its repetition
+            if _collocation_matrix(model, method, work.q[1], work.v[1], h, work.late_band, work) != OK:
                 return NOT_CONVERGED
         previous = change
         if iteration == MAX_ITERATIONS - 1:
@@ -411,8 +429,9 @@ def macro_step(model, collocation, alpha, use_alpha, state, h, longest, ports, s
                 model, alpha, work.trial, step, elapsed - 0.5 * h, ports, tolerance, fresh, work
             )
         else:
+            ahead = 0.5 * (h - elapsed) if fresh else -1.0
             status = collocation_step(
-                model, collocation, work.trial, step, elapsed - 0.5 * h, ports, tolerance, fresh, work
+                model, collocation, work.trial, step, elapsed - 0.5 * h, ports, tolerance, ahead, work
             )
         if status != OK:
             halvings += 1

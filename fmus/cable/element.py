@@ -16,7 +16,7 @@ from __future__ import annotations
 
 import numpy as np
 
-from fmus.jit import kernel
+from fmus.jit import kernel, summing_kernel
 
 N_GAUSS = 5
 _x, _w = np.polynomial.legendre.leggauss(N_GAUSS)
@@ -56,7 +56,7 @@ def mass(l, density, out):
     out[2, 3] = out[3, 2] = -22.0 * l * f
 
 
-@kernel
+@summing_kernel
 def internal_force(q, v, o, l, ea, ei, c, force, out):
     """Add the elastic and damping force of the element at offset `o` of q and v to `force`.
 

@@ -15,11 +15,15 @@ import numpy as np
 
 from orchestrator.fmu import ERROR, FmuError, Group, Port, State
 from orchestrator.graph import Graph
-from orchestrator.masters.base import Between, Loads, Master, StepReport, require_rollback, step_node, vectors
+from orchestrator.masters.base import Between, Loads, Master, StepReport, require_rollback, step_node
 from orchestrator.masters.predictor import Predictor
+from orchestrator.masters.scale import Scale
 from orchestrator.masters.step_control import StepControl
 
 REPLAY = 1e-12  # relative difference of the outcomes of the same step from the same state
+ROUND_OFF = 1e-12
+"""Relative correction of the unknowns below which they are as exact as the arithmetic allows, whatever tolerance is
+asked for: across a stiff coupling the residual itself is only known to its gain times round-off."""
 DIVERGED = 1e6  # growth of the residual over its first value that ends an iteration
 
 
@@ -52,6 +56,7 @@ class Implicit(Master):
     ----------
     tolerance : largest relative residual of a converged step
     absolute : magnitude of an unknown (in its unit) below which the residual counts as absolute
+    lever : m, a moment is measured by this times the force at the same place as well (see `Scale`)
     max_iterations : iterations of one step before it is sub-divided
     max_depth : the macro step is halved at most so often
     predictor : order of the prediction of the unknowns, or -1: the one that did best lately
@@ -65,8 +70,9 @@ class Implicit(Master):
         graph: Graph,
         accelerator: Accelerator,
         *,
-        tolerance: float = 1e-6,
+        tolerance: float = 3e-6,
         absolute: float = 1e-3,
+        lever: float = 0.01,
         max_iterations: int = 25,
         max_depth: int = 6,
         predictor: int = -1,
@@ -79,7 +85,7 @@ class Implicit(Master):
         self.loads = Loads(graph)
         self.between = Between(graph, self.loads, torn=True)
         self.predictor = Predictor(predictor)
-        self.scale = Scale(graph, self.loads, absolute)
+        self.scale = Scale(graph, self.loads, absolute, lever)
         self.places = graph.torn
         self.control = StepControl(self, local_tolerance, absolute, max_depth) if local_tolerance > 0.0 else None
 
@@ -161,6 +167,7 @@ class Implicit(Master):
             observer.restore(saved)
 
     def _accept(self, t: float, H: float) -> None:
+        self.scale.accept(self.x)
         self.predictor.append(t + H / 2, self.x, self.scale.values)
         if self.graph.observers:
             self.graph.accepted(t, H)
@@ -179,21 +186,27 @@ class Implicit(Master):
             r = self._residual(t, H, x, states if k else None, report)
             if r is None:
                 break
-            residual = self.scale.norm(r, x + r, H)
+            residual = self.scale.norm(r, x, H)
             if residual < best[0]:
                 best = (residual, x)
             if residual <= self.tolerance:
-                self.x = x
-                self.accelerator.accept()
-                return True, residual
+                return self._converged(x, residual)
             first = min(first, residual)
             if not residual <= DIVERGED * max(first, self.tolerance):
                 break
-            x = self._correct(t, H, x, r, states)
+            following = self._correct(t, H, x, r, states)
+            if np.max(np.abs(following - x) / self.scale.values) <= ROUND_OFF:
+                return self._converged(x, residual)
+            x = following
         self.accelerator.reject()
         if keep_best:
             self._hold(t, H, best[1], states, report)
         return False, best[0]
+
+    def _converged(self, x: np.ndarray, residual: float) -> tuple[bool, float]:
+        self.x = x
+        self.accelerator.accept()
+        return True, residual
 
     def _begin(self, t: float, H: float, x: np.ndarray, states: list[State]) -> None:
         """Prepare for the iteration of a step that starts at the unknowns `x`."""
@@ -252,38 +265,3 @@ def _compare(outputs: Group, t: float, first: np.ndarray, second: np.ndarray) ->
         f"the same step from the same saved state gives {outputs.names[worst]} = {first[worst]:.9g}, then "
         f"{second[worst]:.9g}: its state is not saved completely; use an explicit master",
     )
-
-
-class Scale:
-    """Typical magnitudes of the unknowns, so that N, N.m and N/s can be compared.
-
-    The running maximum over the components x, y, z of a vector; a load's slope is measured by what it changes
-    in the load within half a step.
-    """
-
-    def __init__(self, graph: Graph, loads: Loads, absolute: float):
-        places, names = graph.torn, [graph.input_names[i] for i in graph.torn]
-        self.vector = vectors(names)
-        where = {int(place): i for i, place in enumerate(places)}
-        pairs = [(where[a], where[b]) for a, b in loads.fed.tolist() if a in where and b in where]
-        self.load, self.rate = np.array(pairs, dtype=np.intp).reshape(-1, 2).T
-        self.absolute = absolute
-        self.largest = np.zeros(int(self.vector.max(initial=-1)) + 1)
-        self.values = np.ones(len(names))
-
-    def reset(self) -> None:
-        """Forget all magnitudes."""
-        self.largest[:] = 0.0
-
-    def update(self, x: np.ndarray, H: float) -> np.ndarray:
-        """Take `x` (n,) into account; return the scale of every unknown, (n,)."""
-        np.maximum.at(self.largest, self.vector, np.abs(x))
-        self.values[:] = self.largest[self.vector]
-        self.values += self.absolute
-        self.values[self.rate] = self.values[self.load] * (2.0 / H)
-        return self.values
-
-    def norm(self, r: np.ndarray, x: np.ndarray, H: float) -> float:
-        """Return the largest relative residual."""
-        self.update(x, H)
-        return float(np.max(np.abs(r) / self.values, initial=0.0))

@@ -11,34 +11,34 @@ from orchestrator.masters.implicit import Accelerator
 
 
 @kernel
-def solve_filtered(V, b, threshold, Q, R, kept, c):
-    """Solve min |V[:, kept] c - b|; a column that adds less than `threshold` of its norm to those before it
-    is dropped.
+def quasi_newton(V, W, first, end, weights, r, threshold, Q, R, kept, c, x):
+    """Add W c to `x`, with c from min |V c + r|; a column that adds less than `threshold` of its norm is dropped.
 
     Gram-Schmidt, twice (which is enough to be orthogonal to round-off), then back substitution.
 
     Parameters
     ----------
-    V : (m, n), one column a row, the most trusted first
-    b : (n,)
+    V, W : (m, n), one column a row, the most trusted first; those from `first` to `end` are used
+    weights : (n,) of the components in the norm
+    r : (n,)
     Q, R : (m, n), (m, m) workspaces
-    kept : (m,) out, numbers of the columns kept
-    c : (m,) out, their coefficients
+    kept, c : (m,) out, numbers of the columns kept and their coefficients
+    x : (n,) changed
 
     Returns
     -------
     int
         number of columns kept
     """
-    m, n = V.shape
+    n = r.size
     k = 0
-    for j in range(m):
+    for j in range(first, end):
         if k == n:
             break
         norm = 0.0
         for i in range(n):
-            Q[k, i] = V[j, i]
-            norm += V[j, i] * V[j, i]
+            Q[k, i] = V[j, i] * weights[i]
+            norm += Q[k, i] * Q[k, i]
         for i in range(k):
             R[i, k] = 0.0
         for _ in range(2):
@@ -61,10 +61,12 @@ def solve_filtered(V, b, threshold, Q, R, kept, c):
     for l in range(k - 1, -1, -1):
         c[l] = 0.0
         for i in range(n):
-            c[l] += Q[l, i] * b[i]
+            c[l] -= Q[l, i] * r[i] * weights[i]
         for j in range(l + 1, k):
             c[l] -= R[l, j] * c[j]
         c[l] /= R[l, l]
+        for i in range(n):
+            x[i] += c[l] * W[kept[l], i]
     return k
 
 
@@ -130,13 +132,25 @@ class LeastSquares(Accelerator):
             self.V[row] = r - self.last[0]
             self.W[row] = mixed - self.last[1]
         self.last = (r, mixed)
-        rows = slice(self.depth - self.new, self.end)
-        if rows.start == rows.stop:
+        first = self.depth - self.new
+        if first == self.end:
             return x + self.relaxation * r
-        scaled = self.V[rows] * self.weights
-        k = solve_filtered(scaled, -r * self.weights, self.threshold, self.Q, self.R, self.kept, self.c)
-        self.columns = k
-        return mixed + self.c[:k] @ self.W[rows][self.kept[:k]]
+        proposed = mixed.copy()
+        self.columns = quasi_newton(
+            self.V,
+            self.W,
+            first,
+            self.end,
+            self.weights,
+            r,
+            self.threshold,
+            self.Q,
+            self.R,
+            self.kept,
+            self.c,
+            proposed,
+        )
+        return proposed
 
     def accept(self) -> None:
         """Keep the columns of the step."""

@@ -57,7 +57,7 @@ class ReducedInterface(Master):
             which = ", ".join(stuck) or "the graph"
             raise GraphError(f"master {self.NAME}: {which} cannot be iterated over; choose jacobi or gauss_seidel")
         loads = Loads(graph)
-        self.scale = Scale(graph, loads, 1e-3)
+        self.scale = Scale(graph, loads, absolute=1e-3, lever=0.01)
         self.between = Between(graph, loads, torn=True)
         self.solver = LeastSquares(graph.torn.size, 8, 1e-6, 0.1)
 
@@ -81,6 +81,7 @@ class ReducedInterface(Master):
         self.between.begin()
         self.outputs.appendleft(graph.y.copy())
         self.x = self._solve(t, H, self.x, self._coasting(), report)
+        self.scale.accept(self.x)
         self.inputs.appendleft(self.x)
         self._advance(t, H)
         report.columns = self.solver.columns
@@ -114,7 +115,7 @@ class ReducedInterface(Master):
             self.solver.begin(H, self.scale.update(x, H).copy())
             for _ in range(self.max_iterations):
                 r = self._residual(t, H, x, y_hat, states)
-                residual = self.scale.norm(r, x + r, H)
+                residual = self.scale.norm(r, x, H)
                 if residual < best[0]:
                     best = (residual, x)
                 if residual <= self.tolerance:

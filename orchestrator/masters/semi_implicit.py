@@ -71,7 +71,7 @@ class SemiImplicit(Implicit):
             self._differentiate(t, H, x, r, states, report)
         x = x - np.linalg.lstsq(self.jacobian, r, rcond=None)[0]  # type: ignore[arg-type]
         r = self._required(t, H, x, states, report)
-        report.residual = self.scale.norm(r, x + r, H)
+        report.residual = self.scale.norm(r, x, H)
         report.converged = self.wanted = bool(report.residual <= self.tolerance)
         self.wanted = not report.converged
         self.x = x
