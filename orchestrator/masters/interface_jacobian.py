@@ -13,6 +13,7 @@ from orchestrator.masters.base import step_node
 from orchestrator.masters.implicit import Implicit
 from orchestrator.masters.least_squares import LeastSquares
 
+WORST = 1e-2  # contraction of the outer iteration that the exactness of the inner one reckons with at most
 SMALLEST = 1e-5  # relative difference of the unknowns below which it says nothing about the Jacobian
 
 
@@ -39,6 +40,8 @@ class InterfaceJacobian(Implicit):
     slow : outer iterations after which J is made anew
     inner_tolerance : residual of the inner iteration, relative to `tolerance`
     inner_iterations : at most
+    max_iterations : outer ones before the step is sub-divided; where the linear models fail, halves cost less, and an
+        iteration that wanders finds solutions far from where the motion comes from
     options : those of `Implicit`
     """
 
@@ -58,9 +61,11 @@ class InterfaceJacobian(Implicit):
         slow: int = 6,
         inner_tolerance: float = 0.1,
         inner_iterations: int = 30,
+        max_iterations: int = 10,
         **options: Any,
     ):
-        super().__init__(graph, LeastSquares(graph.torn.size, reuse, threshold, relaxation), **options)
+        accelerator = LeastSquares(graph.torn.size, reuse, threshold, relaxation)
+        super().__init__(graph, accelerator, max_iterations=max_iterations, **options)
         self.difference, self.slow = difference, slow
         self.inner_tolerance, self.inner_iterations = inner_tolerance, inner_iterations
         self.models = [Model(graph, node) for node in graph.nodes if not node.forward.size and node.torn]
@@ -113,7 +118,7 @@ class InterfaceJacobian(Implicit):
         self.outer += 1
         residual = self.scale.norm(r, x, H)
         if self.last < np.inf:
-            self.contraction = 0.5 * (self.contraction + min(residual / self.last, 1.0))
+            self.contraction = 0.5 * (self.contraction + min(residual / self.last, WORST))
         self.last = residual
         if self.outer == self.slow:
             for model in self.models:
