@@ -26,8 +26,8 @@ from orchestrator.compare import (
     signal_errors,
 )
 from orchestrator.contract import BREAKS, check_variables
-from orchestrator.errors import InputError, RunError
-from orchestrator.estimate import coarser, divisor, estimated_error
+from orchestrator.errors import InputError, OrchestratorError, RunError
+from orchestrator.estimate import factor, second
 from orchestrator.fmu import Fmu, FmuError
 from orchestrator.graph import Connection, Graph
 from orchestrator.masters import MASTERS, StepReport
@@ -53,7 +53,8 @@ class Coupled:
     table : signals at the communication points, ``time`` first
     fields : arrays over time as in ``fields.h5``; empty for a general graph
     fmus : file and SHA-256 of every component
-    estimated_error : of the signals with a tolerance, in their units; empty where none was asked for
+    estimated_error : of the signals with a tolerance, in their units; empty where none was asked for, NaN where it failed
+    estimate_failure : why it failed
     """
 
     scenario: Scenario
@@ -63,6 +64,7 @@ class Coupled:
     fields: dict[str, np.ndarray]
     fmus: dict[str, dict[str, str]]
     estimated_error: dict[str, float] = field(default_factory=dict)
+    estimate_failure: str = ""
 
     @property
     def steps_table(self) -> Table:
@@ -211,20 +213,20 @@ def run(scenario: Scenario, progress: Progress = lambda _: None) -> Coupled:
 
 
 def estimate(coupled: Coupled, progress: Progress = lambda _: None) -> None:
-    """Estimate the error of a finished run from a coarser one, and note it in `coupled`; NaN where that one fails."""
+    """Estimate the error of a finished run by a second one, and note it in `coupled`; whatever fails is noted too."""
     scenario = coupled.scenario
-    coarse = coarser(scenario) if scenario.simulation.estimate == "richardson" else None
-    if coupled.log.error is not None or coarse is None:
+    again = second(scenario) if coupled.log.error is None else None
+    if again is None:
         return
+    found: Mapping[str, float] = {}
     try:
-        other = run(coarse, progress)
-    except RunError:
-        found: dict[str, float] = {}
-    else:
-        by = divisor(scenario, coupled.exchange)
-        found = {} if other.log.error is not None else estimated_error(coupled.table, other.table, by)
+        tables = sorted((coupled.table, _completed(again, progress).table), key=lambda table: len(table["time"]))
+        found = largest_difference(*tables)
+    except OrchestratorError as error:
+        coupled.estimate_failure = str(error)
+    by = factor(scenario, coupled.exchange)
     signals = [name for name in scenario.simulation.tolerances if name in coupled.table]
-    coupled.estimated_error = {name: found.get(name, float("nan")) for name in signals}
+    coupled.estimated_error = {name: by * found.get(name, float("nan")) for name in signals}
 
 
 def _simulated(scenario: Scenario, graph: Graph, progress: Progress) -> Log:
