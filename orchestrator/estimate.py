@@ -21,9 +21,12 @@ from orchestrator.scenario import CableSection, Component, RobotSection, Scenari
 
 RATIOS = {"finer": 0.5, "coarser": 2.0}
 """Estimate → steps of the second run over those of the first."""
-TOLERANCES = {"tolerance": 10.0, "local_tolerance": 32.0}
-"""By this the master's tolerances change when the steps change by two: the iteration's error by more than that of the
-steps, a local error of order 5 as by doubled sub-steps."""
+TOLERANCES = {"tolerance": 10.0, "absolute": 0.1, "local_tolerance": 32.0}
+"""By this the master's tolerances are multiplied where steps are doubled, and divided where they are halved.
+
+The error of the iteration changes about as much as that of the steps; the smallest residual that counts, `tolerance`
+times `absolute`, is near the round-off of the FMUs and stays. A local error of order 5 changes as by doubled sub-steps.
+"""
 INNER_STEP = "integration_step"
 
 

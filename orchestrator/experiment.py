@@ -212,21 +212,29 @@ def run(scenario: Scenario, progress: Progress = lambda _: None) -> Coupled:
     return Coupled(scenario, exchange_of(scenario) if scenario.is_landing else "", log, table, fields, fmus)
 
 
-def estimate(coupled: Coupled, progress: Progress = lambda _: None) -> None:
-    """Estimate the error of a finished run by a second one, and note it in `coupled`; whatever fails is noted too."""
+def estimate(coupled: Coupled, progress: Progress = lambda _: None) -> Coupled | None:
+    """Estimate the error of a finished run by a second one, and note it in `coupled`; a failure is noted, not raised.
+
+    Returns
+    -------
+    Coupled or None
+        the second run; None where there is none, or it failed
+    """
     scenario = coupled.scenario
     again = second(scenario) if coupled.log.error is None else None
     if again is None:
-        return
-    found: Mapping[str, float] = {}
+        return None
+    signals = [name for name in scenario.simulation.tolerances if name in coupled.table]
+    coupled.estimated_error = dict.fromkeys(signals, float("nan"))
     try:
-        tables = sorted((coupled.table, _completed(again, progress).table), key=lambda table: len(table["time"]))
-        found = largest_difference(*tables)
+        other = _completed(again, progress)
     except OrchestratorError as error:
         coupled.estimate_failure = str(error)
-    by = factor(scenario, coupled.exchange)
-    signals = [name for name in scenario.simulation.tolerances if name in coupled.table]
-    coupled.estimated_error = {name: by * found.get(name, float("nan")) for name in signals}
+        return None
+    coarse, fine = sorted((coupled.table, other.table), key=lambda table: len(table["time"]))
+    difference, by = largest_difference(coarse, fine), factor(scenario, coupled.exchange)
+    coupled.estimated_error = {name: by * difference[name] for name in signals}
+    return other
 
 
 def _simulated(scenario: Scenario, graph: Graph, progress: Progress) -> Log:

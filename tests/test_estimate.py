@@ -155,7 +155,8 @@ def test_steps_and_tolerances_change_together(kind, ratio, stop):
     assert other.cable.parameters["integration_step"] == 0.00125 * ratio
     assert other.robot.parameters["integration_step"] == 0.001 * ratio
     changes = {name: change if ratio > 1 else 1 / change for name, change in estimate.TOLERANCES.items()}
-    assert other.master == {name: pytest.approx(1e-6 * change) for name, change in changes.items()}
+    before = {"tolerance": 1e-6, "absolute": 1e-3, "local_tolerance": 1e-6}
+    assert other.master == {name: pytest.approx(before[name] * change) for name, change in changes.items()}
     assert scenario.cable is not None and scenario.cable.parameters["integration_step"] == 0.00125
 
 
