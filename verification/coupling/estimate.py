@@ -163,7 +163,7 @@ def shares(cases: Sequence[Case], kind: str) -> tuple[float, float, float]:
     """Return the shares of estimates that are right, too small, too large (or not known)."""
     ratios = np.array([case.ratio[kind] for case in cases])
     small, right = float(np.mean(ratios < 1.0 / FACTOR)), float(np.mean((ratios >= 1.0 / FACTOR) & (ratios <= FACTOR)))
-    return right, small, 1.0 - right - small
+    return right, small, abs(1.0 - right - small)
 
 
 def table(cases: Sequence[Case]) -> str:
@@ -245,7 +245,8 @@ def _draw_shares(axes: Axes, cases: Sequence[Case]) -> None:
     axes.axvline(1.0, color=GREY, linewidth=0.8)
     for kind, colour in zip(RATIOS, (BLUE, VERMILION), strict=True):
         label = f"{kind} run:\n{shares(cases, kind)[0]:.0%} within\na factor 3"
-        axes.ecdf([case.ratio[kind] for case in cases], color=colour, label=label)
+        ratios = np.nan_to_num([case.ratio[kind] for case in cases], nan=np.inf)
+        axes.ecdf(ratios, color=colour, label=label)
     axes.set(xscale="log", xlim=(0.01, 20.0), ylim=(0.0, 1.0), xticks=(0.1, 1 / 3, 1, 3, 10))
     axes.set(
         xticklabels=("0.1", "1/3", "1", "3", "10"), xlabel="Estimated / true error [–]", ylabel="Share of the cases [–]"
