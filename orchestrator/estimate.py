@@ -21,12 +21,9 @@ from orchestrator.scenario import CableSection, Component, RobotSection, Scenari
 
 RATIOS = {"finer": 0.5, "coarser": 2.0}
 """Estimate → steps of the second run over those of the first."""
-TOLERANCES = {"tolerance": 10.0, "absolute": 0.1, "local_tolerance": 32.0}
-"""By this the master's tolerances are multiplied where steps are doubled, and divided where they are halved.
-
-The error of the iteration changes about as much as that of the steps; the smallest residual that counts, `tolerance`
-times `absolute`, is near the round-off of the FMUs and stays. A local error of order 5 changes as by doubled sub-steps.
-"""
+TOLERANCES = {"tolerance": 10.0, "local_tolerance": 32.0}
+"""By this the master's tolerances are multiplied where steps are doubled, and divided where they are halved: the error of
+the iteration changes about as much as that of the steps, a local error of order 5 as by doubled sub-steps."""
 INNER_STEP = "integration_step"
 
 
@@ -62,11 +59,14 @@ def second(scenario: Scenario) -> Scenario | None:
 
 
 def _inner_steps(scenario: Scenario) -> Iterator[tuple[CableSection | RobotSection | Component, float]]:
-    """Yield the sections of all components that have an inner step, and that step, s."""
+    """Yield the sections of all components that have an inner step of their own, and that step, s.
+
+    That of our cable follows the macro step where the scenario gives none (`orchestrator.landing`).
+    """
     ours: list[tuple[str, CableSection | RobotSection | Component | None]]
     ours = [("cable", scenario.cable), ("robot", scenario.robot)]
     for module, section in ours + [(str(c.model), c) for c in scenario.components.values()]:
-        if section is None:
+        if section is None or (section is scenario.cable and not section.fmu and INNER_STEP not in section.parameters):
             continue
         known = vocabulary.of_fmu(Path(section.fmu)) if section.fmu else vocabulary.of_module(module)
         if INNER_STEP in known and known[INNER_STEP].causality == "parameter":
