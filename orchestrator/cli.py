@@ -147,7 +147,8 @@ def run(
     with _progress(quiet) as show:
         coupled = experiment.run(loaded, show(_task(loaded), loaded.simulation.stop_time))
         if loaded.simulation.estimate != "none":
-            experiment.estimate(coupled, show("error estimate", loaded.simulation.stop_time))
+            words = f"error estimate, {loaded.simulation.estimate} run"
+            experiment.estimate(coupled, show(words, loaded.simulation.stop_time))
     experiment.write(RunDirectory(path), coupled)
     _print_run(coupled)
     print(f"results in {path}")
@@ -327,8 +328,11 @@ def _estimates(coupled: Coupled) -> Iterator[str]:
     for name, error in coupled.estimated_error.items():
         values, tolerance = coupled.table[name], coupled.scenario.simulation.tolerances[name]
         share = error / max(float(values.max() - values.min()), CONSTANT)
-        missed = "MISSED" if share > tolerance else "not known, the coarser run failed"
-        verdict = "within" if share <= tolerance else missed
+        if coupled.estimate_failure:
+            kind = coupled.scenario.simulation.estimate
+            yield f"estimated error of {name}: not known, the {kind} run failed: {coupled.estimate_failure}"
+            continue
+        verdict = "within" if share <= tolerance else "MISSED"
         yield f"estimated error of {name}: {error:.1e} ({share:.1e} of its range, allowed {tolerance:g}): {verdict}"
 
 

@@ -1,51 +1,60 @@
-"""The error of a coupled run, estimated without a reference: the run is repeated with everything coarser.
+"""The error of a coupled run, estimated without a reference: the run is made once more, finer or coarser.
 
-Macro step and inner steps are doubled and the tolerances of the iteration raised, so that each of the errors grows;
-the largest difference between both runs over a divisor, 2^p - 1 for an error of order p, then estimates the error of
-the finer one (Richardson's rule). p is not measured by a third run: on the landings that predicts worse
-(docs/estimate.md).
+Macro step, inner steps and tolerances of the iteration change together, so that no part of the error is common to both
+runs. For an error of order p, e(H) ~ H^p, their largest difference d gives the error of the run at H (Richardson's
+rule):
+
+    finer, at H/2:   e(H) = d 2^p / (2^p - 1),  between d and 2 d for any p >= 1
+    coarser, at 2H:  e(H) = d / (2^p - 1),      between d / 15 and d for p from 4 to 1
+
+What the estimate depends on is whether the error falls with the step, and at H/2 it mostly does (docs/estimate.md).
 """
 
 from __future__ import annotations
 
 from collections.abc import Iterator
-
-import numpy as np
+from pathlib import Path
 
 from orchestrator import vocabulary
 from orchestrator.masters import MASTERS
-from orchestrator.results import Table
 from orchestrator.scenario import CableSection, Component, RobotSection, Scenario
 
-RAISED = {"tolerance": 10.0, "local_tolerance": 32.0}
-"""By this the master's tolerances are multiplied: the error of the iteration grows about as much as that of the step, a
-local error of order 5 as by doubled sub-steps."""
+RATIOS = {"finer": 0.5, "coarser": 2.0}
+"""Estimate → steps of the second run over those of the first."""
+TOLERANCES = {"tolerance": 10.0, "local_tolerance": 32.0}
+"""By this the master's tolerances are multiplied where steps are doubled, and divided where they are halved: the error of
+the iteration changes about as much as that of the steps, a local error of order 5 as by doubled sub-steps."""
 INNER_STEP = "integration_step"
 
 
-def divisor(scenario: Scenario, exchange: str) -> float:
-    """Return what the difference between both runs is divided by.
+def factor(scenario: Scenario, exchange: str) -> float:
+    """Return what the largest difference between both runs is multiplied by to estimate the error.
 
-    `waveform` has order 4 where the motion is smooth and about 2 where touch, lift-off or slip falls inside a step: p
-    is taken as 3. Other implicit coupling, of values at an instant, has order 2. For explicit coupling, of order 1 at
-    least, the difference is taken as it is.
+    The order p of the error: 3 for `waveform`, which has 4 where the motion is smooth and about 2 where touch, lift-off
+    or slip falls inside a step; 2 for other implicit coupling, of values at an instant; 1 at least for explicit coupling.
     """
-    if not MASTERS[scenario.simulation.master].IMPLICIT:
-        return 1.0
-    return 7.0 if exchange == "waveform" else 3.0
+    order = (3 if exchange == "waveform" else 2) if MASTERS[scenario.simulation.master].IMPLICIT else 1
+    finer = scenario.simulation.estimate == "finer"
+    return (2**order if finer else 1) / (2**order - 1)
 
 
-def coarser(scenario: Scenario) -> Scenario | None:
-    """Return the scenario with everything coarser; None if it has fewer than four macro steps."""
+def second(scenario: Scenario) -> Scenario | None:
+    """Return the second run's scenario; None if none is asked for, or one coarser of fewer than two macro steps."""
     simulation = scenario.simulation
-    count, doubled = round(simulation.stop_time / simulation.macro_step), 2.0 * simulation.macro_step
-    if count < 4:
+    ratio = RATIOS.get(simulation.estimate)
+    if ratio is None:
         return None
-    copy = scenario.changed(macro_step=doubled, stop_time=(count // 2) * doubled)
-    for section, step in _inner_steps(copy):
-        section.parameters[INNER_STEP] = 2.0 * step
+    step = ratio * simulation.macro_step
+    count = int(simulation.stop_time / step * (1.0 + 1e-9))
+    if count < 2:
+        return None
+    copy = scenario.changed(macro_step=step, stop_time=count * step)
+    for section, inner in _inner_steps(copy):
+        section.parameters[INNER_STEP] = ratio * inner
     options = vocabulary.masters()[simulation.master] | copy.master
-    copy.master.update({name: factor * options[name] for name, factor in RAISED.items() if options.get(name)})
+    for name, change in TOLERANCES.items():
+        if options.get(name):
+            copy.master[name] = options[name] * (change if ratio > 1.0 else 1.0 / change)
     return copy
 
 
@@ -54,19 +63,11 @@ def _inner_steps(scenario: Scenario) -> Iterator[tuple[CableSection | RobotSecti
 
     That of our cable follows the macro step where the scenario gives none (`orchestrator.landing`).
     """
-    for section in (scenario.cable, scenario.robot, *scenario.components.values()):
-        if section is not None and INNER_STEP in section.parameters:
-            yield section, float(section.parameters[INNER_STEP])
-    robot = scenario.robot
-    if robot is not None and robot.fmu is None and INNER_STEP not in robot.parameters:
-        yield robot, float(vocabulary.of_module("robot")[INNER_STEP].start)
-
-
-def estimated_error(fine: Table, coarse: Table, divisor: float) -> dict[str, float]:
-    """Return the estimated largest error of every signal of `fine`, in its unit; every other row is in `coarse`."""
-    rows = slice(0, 2 * len(coarse["time"]) - 1, 2)
-    return {
-        name: float(np.max(np.abs(values[rows] - coarse[name]))) / divisor
-        for name, values in fine.items()
-        if name in coarse and name != "time"
-    }
+    ours: list[tuple[str, CableSection | RobotSection | Component | None]]
+    ours = [("cable", scenario.cable), ("robot", scenario.robot)]
+    for module, section in ours + [(str(c.model), c) for c in scenario.components.values()]:
+        if section is None or (section is scenario.cable and not section.fmu and INNER_STEP not in section.parameters):
+            continue
+        known = vocabulary.of_fmu(Path(section.fmu)) if section.fmu else vocabulary.of_module(module)
+        if INNER_STEP in known and known[INNER_STEP].causality == "parameter":
+            yield section, float(section.parameters.get(INNER_STEP, known[INNER_STEP].start))

@@ -26,8 +26,8 @@ from orchestrator.compare import (
     signal_errors,
 )
 from orchestrator.contract import BREAKS, check_variables
-from orchestrator.errors import InputError, RunError
-from orchestrator.estimate import coarser, divisor, estimated_error
+from orchestrator.errors import InputError, OrchestratorError, RunError
+from orchestrator.estimate import factor, second
 from orchestrator.fmu import Fmu, FmuError
 from orchestrator.graph import Connection, Graph
 from orchestrator.masters import MASTERS, StepReport
@@ -53,7 +53,8 @@ class Coupled:
     table : signals at the communication points, ``time`` first
     fields : arrays over time as in ``fields.h5``; empty for a general graph
     fmus : file and SHA-256 of every component
-    estimated_error : of the signals with a tolerance, in their units; empty where none was asked for
+    estimated_error : of the signals with a tolerance, in their units; empty where none was asked for, NaN where it failed
+    estimate_failure : why it failed
     """
 
     scenario: Scenario
@@ -63,6 +64,7 @@ class Coupled:
     fields: dict[str, np.ndarray]
     fmus: dict[str, dict[str, str]]
     estimated_error: dict[str, float] = field(default_factory=dict)
+    estimate_failure: str = ""
 
     @property
     def steps_table(self) -> Table:
@@ -210,21 +212,29 @@ def run(scenario: Scenario, progress: Progress = lambda _: None) -> Coupled:
     return Coupled(scenario, exchange_of(scenario) if scenario.is_landing else "", log, table, fields, fmus)
 
 
-def estimate(coupled: Coupled, progress: Progress = lambda _: None) -> None:
-    """Estimate the error of a finished run from a coarser one, and note it in `coupled`; NaN where that one fails."""
+def estimate(coupled: Coupled, progress: Progress = lambda _: None) -> Coupled | None:
+    """Estimate the error of a finished run by a second one, and note it in `coupled`; a failure is noted, not raised.
+
+    Returns
+    -------
+    Coupled or None
+        the second run; None where there is none, or it failed
+    """
     scenario = coupled.scenario
-    coarse = coarser(scenario) if scenario.simulation.estimate == "richardson" else None
-    if coupled.log.error is not None or coarse is None:
-        return
-    try:
-        other = run(coarse, progress)
-    except RunError:
-        found: dict[str, float] = {}
-    else:
-        by = divisor(scenario, coupled.exchange)
-        found = {} if other.log.error is not None else estimated_error(coupled.table, other.table, by)
+    again = second(scenario) if coupled.log.error is None else None
+    if again is None:
+        return None
     signals = [name for name in scenario.simulation.tolerances if name in coupled.table]
-    coupled.estimated_error = {name: found.get(name, float("nan")) for name in signals}
+    coupled.estimated_error = dict.fromkeys(signals, float("nan"))
+    try:
+        other = _completed(again, progress)
+    except OrchestratorError as error:
+        coupled.estimate_failure = str(error)
+        return None
+    coarse, fine = sorted((coupled.table, other.table), key=lambda table: len(table["time"]))
+    difference, by = largest_difference(coarse, fine), factor(scenario, coupled.exchange)
+    coupled.estimated_error = {name: by * difference[name] for name in signals}
+    return other
 
 
 def _simulated(scenario: Scenario, graph: Graph, progress: Progress) -> Log:

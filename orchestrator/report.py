@@ -138,6 +138,8 @@ def _summary_rows(summary: dict[str, Any]) -> list[tuple[str, ...]]:
     shown += ("iterations_per_step", "unconverged_steps", "left_the_groove")
     energy = summary.get("energy") or {}
     rows = [("energy " + name, str(energy[name])) for name in ("drift_J", "exchanged_J", "verdict") if name in energy]
+    errors = summary.get("estimated_error", {}).items()
+    rows += [(f"estimated error of {name}", "not known" if e is None else f"{e:.2e}") for name, e in errors]
     return [("what", "value"), *((name, str(summary[name])) for name in shown), *rows]
 
 

@@ -56,7 +56,7 @@ NonNegative = Annotated[float, Field(ge=0.0)]
 class Simulation(Section):
     """Times in s. `tolerances`: the largest `relative_max_error` that `compare` lets pass, by signal.
 
-    `estimate`: whether and how `run` estimates the error of those signals (docs/estimate.md).
+    `estimate`: by which second run `run` estimates the error of those signals, if any (docs/estimate.md).
     """
 
     stop_time: Positive
@@ -64,7 +64,7 @@ class Simulation(Section):
     master: str = DEFAULT_MASTER
     exchange: Literal["point", "hermite", "waveform"] | None = None
     tolerances: dict[str, Positive] = {}
-    estimate: Literal["richardson", "none"] = "richardson"
+    estimate: Literal["finer", "coarser", "none"] = "finer"
 
 
 class CableSection(Section):

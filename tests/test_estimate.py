@@ -5,13 +5,17 @@ Expected values: conservation of energy (test FMUs are exact inside a step), the
 
 from __future__ import annotations
 
+import signal
+
 import numpy as np
 import pytest
 
 from orchestrator import estimate, experiment
+from orchestrator.errors import InputError
+from orchestrator.fmu import Fmu, FmuError
 from orchestrator.graph import Connection, Graph
 from orchestrator.masters.step_control import SAFETY, StepControl
-from orchestrator.scenario import load
+from orchestrator.scenario import Scenario, load
 from orchestrator.simulation import Log
 from tests.fmus import fmu
 from tests.test_cli import LANDING, OSCILLATOR, exact_oscillator
@@ -113,11 +117,21 @@ def test_controller_finds_the_length_that_the_error_allows():
     assert max(lengths) < 1.3 * lengths[-1]
 
 
-@pytest.mark.parametrize(("master", "H"), [("iqn_ils", 0.02), ("iqn_ils", 0.005), ("gauss_seidel", 0.002)])
-def test_estimate_of_the_oscillator_is_within_a_factor_three(master, H):
+CASES = [
+    ("finer", "iqn_ils", 0.02),
+    ("finer", "iqn_ils", 0.005),
+    ("finer", "gauss_seidel", 0.002),
+    ("finer", "jacobi", 0.005),
+    ("coarser", "iqn_ils", 0.005),
+    ("coarser", "gauss_seidel", 0.002),
+]
+
+
+@pytest.mark.parametrize(("kind", "master", "H"), CASES)
+def test_estimate_of_the_oscillator_is_within_a_factor_three(kind, master, H):
     """Against the exponential of the 4 x 4 matrix; the order is the declared one, so the rule is nearly exact."""
-    scenario = load(OSCILLATOR, [f"simulation.macro_step={H}", "simulation.stop_time=2.0"], master=master)
-    coupled = experiment.run(scenario)
+    settings = [f"simulation.macro_step={H}", "simulation.stop_time=2.0", f"simulation.estimate={kind}"]
+    coupled = experiment.run(load(OSCILLATOR, settings, master=master))
     experiment.estimate(coupled)
     exact = dict(zip(("left.position", "right.position"), exact_oscillator(coupled.table["time"]), strict=True))
     assert list(coupled.estimated_error) == list(exact)
@@ -127,24 +141,88 @@ def test_estimate_of_the_oscillator_is_within_a_factor_three(master, H):
     assert experiment.summary(coupled)["estimated_error"] == coupled.estimated_error
 
 
-def test_everything_is_coarser():
-    scenario = load(LANDING, ["simulation.stop_time=0.055", "master.local_tolerance=1e-6"])
-    coarse = estimate.coarser(scenario)
-    assert coarse is not None and coarse.cable is not None and coarse.robot is not None
-    assert (coarse.simulation.macro_step, coarse.simulation.stop_time) == (0.01, 0.05)  # eleven steps: one is left over
-    assert "integration_step" not in coarse.cable.parameters  # it follows the macro step
-    assert coarse.robot.parameters["integration_step"] == 0.002  # twice the default of the robot's table
-    assert coarse.master == {"tolerance": pytest.approx(3e-5), "local_tolerance": pytest.approx(3.2e-5)}
-    assert estimate.coarser(scenario.changed(stop_time=0.015)) is None
+def landing(*settings: str) -> Scenario:
+    return load(LANDING, ["simulation.stop_time=0.055", *settings])
 
 
-def test_difference_of_tables_by_hand():
-    fine = {"time": np.arange(6.0), "x": np.array([0.0, 9.0, 1.0, 9.0, 2.0, 9.0])}
-    coarse = {"time": np.array([0.0, 2.0, 4.0]), "x": np.array([0.0, 1.5, 2.7])}
-    assert estimate.estimated_error(fine, coarse, 7.0) == {"x": pytest.approx(0.1)}
+@pytest.mark.parametrize(("kind", "ratio", "stop"), [("finer", 0.5, 0.055), ("coarser", 2.0, 0.05)])
+def test_steps_and_tolerances_change_together(kind, ratio, stop):
+    """Eleven macro steps: one is left over where they are doubled. The robot's inner step is its table's default."""
+    scenario = landing(f"simulation.estimate={kind}", "master.local_tolerance=1e-6")
+    other = estimate.second(scenario)
+    assert other is not None and other.cable is not None and other.robot is not None
+    assert other.simulation.macro_step == 0.005 * ratio and other.simulation.stop_time == pytest.approx(stop)
+    assert "integration_step" not in other.cable.parameters  # it follows the macro step
+    assert other.robot.parameters["integration_step"] == 0.001 * ratio
+    changes = {name: change if ratio > 1 else 1 / change for name, change in estimate.TOLERANCES.items()}
+    before = {"tolerance": 3e-6, "local_tolerance": 1e-6}
+    assert other.master == {name: pytest.approx(before[name] * change) for name, change in changes.items()}
+    assert scenario.robot is not None and "integration_step" not in scenario.robot.parameters
+
+
+def test_an_inner_step_of_the_scenario_is_halved():
+    other = estimate.second(landing("cable.parameters.integration_step=0.002"))
+    assert other is not None and other.cable is not None and other.cable.parameters["integration_step"] == 0.001
+
+
+@pytest.mark.parametrize(
+    ("stop", "kind", "made"), [(0.01, "coarser", False), (0.02, "coarser", True), (0.005, "finer", True)]
+)
+def test_macro_steps_needed(stop, kind, made):
+    scenario = landing(f"simulation.estimate={kind}").changed(stop_time=stop)
+    assert (estimate.second(scenario) is not None) == made
+
+
+@pytest.mark.parametrize(
+    ("kind", "master", "exchange", "expected"),
+    [
+        ("finer", "iqn_ils", "waveform", 8 / 7),
+        ("finer", "iqn_ils", "point", 4 / 3),
+        ("finer", "jacobi", "point", 2.0),
+        ("coarser", "iqn_ils", "waveform", 1 / 7),
+        ("coarser", "iqn_ils", "point", 1 / 3),
+        ("coarser", "jacobi", "point", 1.0),
+    ],
+)
+def test_factor_by_hand(kind, master, exchange, expected):
+    """From d = e(H) - e(H/2), and d = e(2H) - e(H), with e ~ H^p and p = 3, 2, 1."""
+    scenario = landing(f"simulation.estimate={kind}", f"simulation.master={master}", "master={}")
+    assert estimate.factor(scenario, exchange) == pytest.approx(expected)
+
+
+def finished() -> experiment.Coupled:
+    return experiment.run(load(OSCILLATOR, ["simulation.stop_time=0.1"]))
 
 
 def test_no_estimate_where_none_is_asked_for():
     coupled = experiment.run(load(OSCILLATOR, ["simulation.stop_time=0.1", "simulation.estimate=none"]))
     experiment.estimate(coupled)
-    assert coupled.estimated_error == {}
+    assert coupled.estimated_error == {} and coupled.estimate_failure == ""
+
+
+def test_ctrl_c_in_the_second_run_leaves_the_first():
+    coupled = finished()
+    experiment.estimate(coupled, lambda time: signal.raise_signal(signal.SIGINT) if time > 0.031 else None)
+    assert coupled.estimate_failure == "interrupted at t = 0.035 s"
+    assert coupled.log.error is None and np.isnan(list(coupled.estimated_error.values())).all()
+
+
+def test_failure_of_the_second_run_is_said(monkeypatch):
+    """An FMU that takes no step below 10 ms, like one of a fixed step of its own, discards the half."""
+    coupled, step = finished(), Fmu.step
+
+    def fixed(self, t: float, h: float) -> None:
+        if h < 0.0099:
+            raise FmuError(self.name, t, 2, "steps of 10 ms only")
+        step(self, t, h)
+
+    monkeypatch.setattr(Fmu, "step", fixed)
+    experiment.estimate(coupled)
+    assert "steps of 10 ms only" in coupled.estimate_failure
+    assert list(coupled.estimated_error) == ["left.position", "right.position"]
+    assert np.isnan(list(coupled.estimated_error.values())).all()
+
+
+def test_unknown_estimate_names_those_there_are():
+    with pytest.raises(InputError, match="'richardson' must be 'finer', 'coarser' or 'none'"):
+        landing("simulation.estimate=richardson")

@@ -4,38 +4,66 @@ from __future__ import annotations
 
 from functools import cache
 from pathlib import Path
+from typing import NamedTuple
 
 from orchestrator import experiment
-from orchestrator.compare import Reference
+from orchestrator.compare import Reference, communication_times
 from orchestrator.experiment import Coupled
+from orchestrator.landing import problem
+from orchestrator.monolithic.solve import TOLERANCE, Solution, solve
 from orchestrator.scenario import Scenario, load
 
 FOLDER = Path(__file__).resolve().parents[2] / "scenarios"
-LANDINGS: dict[str, tuple[str, str | None]] = {
-    "20 m from the tower": ("landing_200m_point9", None),
-    "the same, physical": ("landing_200m_point9_physical", None),
-    "midspan": ("landing_200m_midspan", None),
-    "drop from 5 cm": ("drop_5cm", None),
-    "inclined rig": ("rig_10m_inclined", None),
-    "two wheels": ("landing_200m_point9", "hybrid_robot_2"),
+
+
+class Landing(NamedTuple):
+    """A scenario file, the robot in its place, and settings in place of the file's."""
+
+    file: str
+    robot: str | None = None
+    settings: tuple[str, ...] = ()
+
+
+LANDINGS = {
+    "20 m from the tower": Landing("landing_200m_point9"),
+    "the same, physical": Landing("landing_200m_point9_physical"),
+    "midspan": Landing("landing_200m_midspan"),
+    "drop from 5 cm": Landing("drop_5cm"),
+    "inclined rig": Landing("rig_10m_inclined"),
+    "two wheels": Landing("landing_200m_point9", "hybrid_robot_2"),
 }
-"""Words → scenario file, and the robot in its place."""
+FORTY = ("landing.position=40.0", "cable.parameters.grading_position=40.0")
+OTHERS = {
+    "rig": Landing("rig_10m"),
+    "10 kg": Landing("landing_200m_point9", "fptlir_10kg"),
+    "hard drop, k = 1e10": Landing("drop_5cm", settings=("contact.parameters.stiffness=1e10",)),
+    "100 kg, 40 m from the tower": Landing("landing_200m_point9_physical", "fptlir_100kg", FORTY),
+    "two wheels, another robot": Landing("landing_200m_point9", "hybrid_robot_1"),
+}
+"""Landings that no choice of the coupling was made by."""
 STOP = 1.2
 SIGNALS = ("robot.body.position.z", "robot.roll")
 
 
-def scenario(landing: str, master: str | None = None, macro_step: float | None = None) -> Scenario:
-    """Return a landing over `STOP` s with another master and macro step."""
-    name, robot = LANDINGS[landing]
-    settings = [f"simulation.stop_time={STOP}"]
-    settings += [f"simulation.macro_step={macro_step!r}"] if macro_step else []
-    return load(FOLDER / f"{name}.toml", settings, robot, master)
+def scenario(landing: str, master: str | None = None, macro_step: float | None = None, *more: str) -> Scenario:
+    """Return a landing over `STOP` s with another master, macro step, and `more` settings."""
+    file, robot, settings = (LANDINGS | OTHERS)[landing]
+    times = [f"simulation.stop_time={STOP}"]
+    times += [f"simulation.macro_step={macro_step!r}"] if macro_step else []
+    return load(FOLDER / f"{file}.toml", [*settings, *times, *more], robot, master)
 
 
 @cache
 def reference(landing: str, macro_steps: tuple[float, ...]) -> Reference:
     """Return the monolithic solution at the communication points of all `macro_steps`."""
     return experiment.reference(scenario(landing), macro_steps)
+
+
+@cache
+def truth(landing: str, macro_steps: tuple[float, ...]) -> Solution:
+    """Return the same with a hundredth of the solver's tolerance, to judge small errors by."""
+    one = scenario(landing)
+    return solve(lambda: problem(one), communication_times(STOP, macro_steps), 0.01 * TOLERANCE)
 
 
 def coupled(landing: str, master: str, macro_step: float) -> Coupled:
