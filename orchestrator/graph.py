@@ -410,11 +410,18 @@ def _checked(components: Mapping[str, Fmu], connection: Connection) -> _Link:
         raise GraphError(f"{where}: {connection.source} is no output but {a.causality}; connect from an output")
     if b.causality != "input":
         raise GraphError(f"{where}: {connection.target} is no input but {b.causality}; connect to an input")
-    if (a.kind, b.kind) not in CASTS:
-        raise GraphError(f"{where}: {a.kind} cannot feed {b.kind}; connect variables of one type")
+    if (a.kind, b.kind) not in CASTS or not _holds(components[target[0]], b, components[source[0]], a):
+        raise GraphError(f"{where}: {a.fmi_type} cannot feed {b.fmi_type}; connect variables of one type")
     gain, offset = _conversion(components[source[0]], a, components[target[0]], b, where)
     discrete = "discrete" in (a.variability, b.variability) or b.kind != "real" or a.kind != "real"
     return _Link(source, target, gain, offset, discrete)
+
+
+def _holds(fmu_b: Fmu, b: Port, fmu_a: Fmu, a: Port) -> bool:
+    """Return whether every whole number of the type of `a` has a place in that of `b`."""
+    if a.kind != "integer" or "Enumeration" in (a.fmi_type, b.fmi_type):
+        return True
+    return np.can_cast(fmu_a.fmi.TYPES[a.fmi_type][1], fmu_b.fmi.TYPES[b.fmi_type][1])
 
 
 def _split(components: Mapping[str, Fmu], signal: str, where: str) -> tuple[str, str]:
