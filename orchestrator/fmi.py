@@ -168,8 +168,12 @@ class Fmi2:
         text = self.slave.getString([vr])[0]
         return text.decode() if isinstance(text, bytes) else str(text)
 
+    def terminate(self) -> int:
+        """Let the FMU end its run: some write their files only now."""
+        return self._checked(self.slave.terminate)
+
     def free(self) -> None:
-        """Terminate nothing, free the instance; the library stays loaded (other instances use it)."""
+        """Free the instance; the library stays loaded (other instances use it)."""
         getattr(self.slave, f"{self.PREFIX}FreeInstance")(self.component)
 
 

@@ -10,6 +10,7 @@ import atexit
 import contextlib
 import difflib
 import hashlib
+import logging
 import os
 import re
 import tempfile
@@ -24,9 +25,13 @@ import fmpy
 import numpy as np
 from fmpy.model_description import ModelDescription, ModelVariable
 
-from orchestrator.fmi import DISCARD, ERROR, LABELS, WARNING, Call, Fmi2, Fmi3, finalize_python
+from orchestrator.fmi import DISCARD, ERROR, FATAL, LABELS, WARNING, Call, Fmi2, Fmi3, finalize_python
+
+logging.getLogger("fmus").addHandler(logging.NullHandler())  # what our FMUs say comes through FMI, like that of others
 
 NOT_FINITE, TIMEOUT = 5, 6
+SHORTER, FORWARD = "; a smaller macro step may help", "; take a master that never goes back, jacobi or gauss_seidel"
+CURES = {DISCARD: SHORTER, NOT_FINITE: SHORTER}
 KINDS: dict[str, str] = {
     "Real": "real",
     "Float64": "real",
@@ -133,11 +138,19 @@ def unzip(path: Path, sha256: str) -> Path:
     return folder
 
 
+def element_names(variable: ModelVariable) -> list[str]:
+    """Return the names of a variable's elements: ``x``, or ``x[1]``, ``x[2]`` …, or ``x[1,1]``, ``x[1,2]`` …"""
+    if not variable.shape:
+        return [variable.name]
+    places = np.ndindex(*variable.shape)
+    return [f"{variable.name}[{','.join(str(i + 1) for i in place)}]" for place in places]
+
+
 def _ports(variable: ModelVariable) -> list[Port]:
     kind: Any = KINDS.get(variable.type, "integer")
     unit = variable.unit or (variable.declaredType.unit if variable.declaredType else None) or ""
     size = int(np.prod(variable.shape)) if variable.shape else 1
-    names = [variable.name] if not variable.shape else [f"{variable.name}[{i + 1}]" for i in range(size)]
+    names = element_names(variable)
     fixed = (
         unit,
         kind,
@@ -221,28 +234,31 @@ class Group:
         """Read all from the FMU into `values`."""
         status = self._get()
         if status > WARNING:
-            raise self.fmu.error(status, f"reading {self.names[0]} … {self.names[-1]}")
+            raise self.fmu.error(status, f"reading {self._span()}")
 
     def set(self) -> None:
         """Write all of `values` to the FMU."""
         status = self._set()
         if status > WARNING:
-            raise self.fmu.error(status, f"writing {self.names[0]} … {self.names[-1]}")
+            raise self.fmu.error(status, f"writing {self._span()}")
 
     def get_finite(self) -> None:
         """Read all; raise `FmuError` if a value is not finite."""
         status = self._get()
         if status > WARNING:
-            raise self.fmu.error(status, f"reading {self.names[0]} … {self.names[-1]}")
+            raise self.fmu.error(status, f"reading {self._span()}")
         total = self.values.dot(self.ones)
         if not -np.inf < total < np.inf:
             self._name_not_finite()
+
+    def _span(self) -> str:
+        return self.names[0] if len(self.names) == 1 else f"{self.names[0]} … {self.names[-1]}"
 
     def _name_not_finite(self) -> None:
         bad = [name for name, value in zip(self.names, self.values, strict=True) if not np.isfinite(value)]
         if bad:
             more = f" and {len(bad) - 1} more" if len(bad) > 1 else ""
-            raise FmuError(self.fmu.name, self.fmu.time, NOT_FINITE, f"output {bad[0]}{more} is not a finite number")
+            raise self.fmu.failure(NOT_FINITE, f"output {bad[0]}{more} is not a finite number")
 
 
 class Fmu:
@@ -261,6 +277,7 @@ class Fmu:
     solves, wall : steps made and the seconds spent in them
     time : s, start of the last step
     busy_since : clock at which the running call began, 0 when none runs
+    worst : highest FMI status that a call came back with, beyond warning
     """
 
     def __init__(self, path: str | Path, name: str | None = None):
@@ -272,9 +289,12 @@ class Fmu:
         self.log: list[str] = []
         self.parameters: dict[str, Value] = {}
         self.solves, self.wall, self.time, self.busy_since = 0, 0.0, 0.0, 0.0
+        self.worst, self.initialized = 0, False
+        _require_possible(self)
         binding = Fmi3 if str(self.description.fmiVersion).startswith("3") else Fmi2
         try:
-            self.fmi = binding(self.description, unzip(self.path, self.sha256), self.name, self._message)
+            with contextlib.chdir("."):  # FMPy stays in the library's folder if that cannot be loaded
+                self.fmi = binding(self.description, unzip(self.path, self.sha256), self.name, self._message)
         except Exception as error:
             hint = f" ({self.log[-1]})" if self.log else ""
             raise ValueError(f"{self.path}: the FMU cannot be loaded: {error}{hint}") from error
@@ -284,11 +304,17 @@ class Fmu:
         label = LABELS[status] if 0 <= status < len(LABELS) else str(status)
         self.log.append(f"[{label}] {text}")
 
-    def error(self, status: int, doing: str) -> FmuError:
+    def error(self, status: int, doing: str, cure: str = "") -> FmuError:
         """Return the error for a call that came back with `status`."""
         label = LABELS[status] if 0 <= status < len(LABELS) else f"unknown status {status}"
+        self.worst = max(self.worst, status)
+        known = status if DISCARD <= status <= FATAL else ERROR
+        return self.failure(known, f"{doing} came back with {label}", cure)
+
+    def failure(self, status: int, what: str, cure: str = "") -> FmuError:
+        """Return the error that says `what` happened, with the FMU's own last words and a cure."""
         said = f"; the FMU says: {self.log[-1]}" if self.log else ""
-        return FmuError(self.name, self.time, status, f"{doing} came back with {label}{said}")
+        return FmuError(self.name, self.time, status, what + said + (cure or CURES.get(status, "")))
 
     def port(self, name: str) -> Port:
         """Return the port; `ValueError` names the nearest one."""
@@ -324,11 +350,20 @@ class Fmu:
             if status > WARNING:
                 raise self.error(status, f"setting {port.name}")
             return
-        if port.kind in ("integer", "boolean") and float(value) != int(value):
-            raise ValueError(f"{self.name}.{port.name} is of type {port.kind}; {value!r} does not fit")
+        if not self._fits(port, value):
+            raise ValueError(f"{self.name}.{port.name} is of type {port.fmi_type}; {value!r} does not fit")
         group = self.group([port.name])
         group.values[0] = float(value)
         group.set()
+
+    def _fits(self, port: Port, value: Value) -> bool:
+        """Return whether a number can be given to `port` as it is."""
+        if port.kind == "real":
+            return True
+        number = int(value)
+        limits = (0, 1) if port.kind == "boolean" else np.iinfo(self.fmi.TYPES[port.fmi_type][1])
+        low, high = limits if isinstance(limits, tuple) else (limits.min, limits.max)
+        return number == value == float(number) and low <= number <= high
 
     def read(self, name: str) -> Value:
         """Return one variable, of any type (slow)."""
@@ -353,6 +388,7 @@ class Fmu:
     def exit_initialization(self) -> None:
         """Leave initialisation mode."""
         self._call("end of initialisation", self.fmi.exit_initialization)
+        self.initialized = True
 
     def _call(self, doing: str, function: Any, *arguments: Any) -> None:
         self.busy_since = perf_counter()
@@ -377,25 +413,44 @@ class Fmu:
         state = c_void_p()
         status = self.fmi.get_state(state)
         if status > WARNING:
-            raise self.error(max(status, ERROR), "saving the state")
+            raise self.error(max(status, ERROR), "saving the state", FORWARD)
         return state
 
     def restore(self, state: State) -> None:
         """Go back to a saved state (inputs too)."""
         status = self.fmi.set_state(state)
         if status > WARNING:
-            raise self.error(max(status, ERROR), "restoring the state")
+            raise self.error(max(status, ERROR), "restoring the state", FORWARD)
 
     def release(self, state: State) -> None:
         """Free a saved state."""
         self.fmi.free_state(state)
 
     def close(self) -> None:
-        """Free the instance; does nothing the second time."""
-        if self in _instances:
-            _instances.remove(self)
-            _libraries.append(self.fmi.slave.dll)
+        """End and free the instance, as far as FMI allows it; does nothing the second time."""
+        if self not in _instances or self.busy_since:  # a call that hangs in there would not let this one through
+            return
+        _instances.remove(self)
+        _libraries.append(self.fmi.slave.dll)
+        if self.initialized and self.worst < ERROR:
+            self.fmi.terminate()
+        if self.worst < FATAL:
             self.fmi.free()
+
+
+def _require_possible(fmu: Fmu) -> None:
+    """Raise `ValueError` if the FMU cannot run here, or not once more."""
+    here = fmpy.platform_tuple if str(fmu.description.fmiVersion).startswith("3") else fmpy.platform
+    there = fmpy.supported_platforms(str(fmu.path))
+    if fmpy.platform not in there:
+        has = f"it has {', '.join(there)}" if there else "it has none at all"
+        raise ValueError(f"{fmu.path}: the FMU has no binary for {here} ({has}); export it for this platform")
+    interface: Any = fmu.description.coSimulation
+    if interface.canBeInstantiatedOnlyOncePerProcess and any(other.sha256 == fmu.sha256 for other in _instances):
+        raise ValueError(
+            f"{fmu.path}: can be instantiated only once per process, {fmu.name} would be the second; use a copy of "
+            "the model under another name"
+        )
 
 
 def _read(path: Path) -> tuple[ModelDescription, str]:

@@ -274,27 +274,43 @@ class Graph:
             node.inputs.set()
 
     def initialize(self, start: float, stop: float | None = None) -> None:
-        """Initialise all FMUs consistently: values go along the connections, algebraic loops are solved."""
+        """Initialise all FMUs consistently: values go along the connections, algebraic loops are solved.
+
+        Many FMUs know their outputs only after their initialisation. So each leaves it in turn, in the order of
+        execution, with what the ones before it show by then.
+        """
         for node in self.nodes:
             node.fmu.enter_initialization(start, stop)
-        self.refresh(self.initial_stages)
-        for _ in self.nodes:  # a discrete value goes at most through all components
+        if self._settled(self.initial_stages) and self._loop.size:
+            self._solve_loops(start)
+        for node in self.nodes:
+            node_inputs(self, node)
+            node.inputs.set()
+            node.fmu.exit_initialization()
+            node.outputs.get()
+        self._settle(self.stages)
+
+    def _settled(self, stages: list[list[Node]]) -> bool:
+        """Settle as far as the FMUs know their outputs; return whether all do, else the rest is zero for now."""
+        try:
+            self._settle(stages)
+        except FmuError as error:
+            if not error.recoverable:
+                raise
+            for values in (self.y, self.e, self.d):
+                values[~np.isfinite(values)] = 0.0
+            return False
+        return True
+
+    def _settle(self, stages: list[list[Node]]) -> None:
+        """Move all values, discrete ones too, until they stay: they go at most through all components."""
+        self.refresh(stages)
+        for _ in self.nodes:
             before = self.d.copy()
             self.exchange_discrete()
-            self.refresh(self.initial_stages)
+            self.refresh(stages)
             if np.array_equal(before, self.d):
                 break
-        if self._loop.size:
-            self._solve_loops(start)
-        self._send_all()
-        for node in self.nodes:
-            node.fmu.exit_initialization()
-        self.refresh()
-
-    def _send_all(self) -> None:
-        for node in self.nodes:
-            node.inputs.set()
-        self.exchange_discrete()
 
     def _loop_residual(self, z: np.ndarray) -> np.ndarray:
         """Set the inputs in algebraic loops to `z`; return how far the outputs contradict them."""
@@ -394,11 +410,18 @@ def _checked(components: Mapping[str, Fmu], connection: Connection) -> _Link:
         raise GraphError(f"{where}: {connection.source} is no output but {a.causality}; connect from an output")
     if b.causality != "input":
         raise GraphError(f"{where}: {connection.target} is no input but {b.causality}; connect to an input")
-    if (a.kind, b.kind) not in CASTS:
-        raise GraphError(f"{where}: {a.kind} cannot feed {b.kind}; connect variables of one type")
+    if (a.kind, b.kind) not in CASTS or not _holds(components[target[0]], b, components[source[0]], a):
+        raise GraphError(f"{where}: {a.fmi_type} cannot feed {b.fmi_type}; connect variables of one type")
     gain, offset = _conversion(components[source[0]], a, components[target[0]], b, where)
     discrete = "discrete" in (a.variability, b.variability) or b.kind != "real" or a.kind != "real"
     return _Link(source, target, gain, offset, discrete)
+
+
+def _holds(fmu_b: Fmu, b: Port, fmu_a: Fmu, a: Port) -> bool:
+    """Return whether every whole number of the type of `a` has a place in that of `b`."""
+    if a.kind != "integer" or "Enumeration" in (a.fmi_type, b.fmi_type):
+        return True
+    return np.can_cast(fmu_a.fmi.TYPES[a.fmi_type][1], fmu_b.fmi.TYPES[b.fmi_type][1])
 
 
 def _split(components: Mapping[str, Fmu], signal: str, where: str) -> tuple[str, str]:

@@ -137,6 +137,7 @@ def _look_at(robot: Robot, path: Path, resolved: Parts) -> None:
     try:
         fmu.set_parameters(resolved.robot)
         fmu.enter_initialization(0.0)
+        fmu.exit_initialization()  # many FMUs know their outputs only now
         for k in range(resolved.n_wheels):
             for axis in "xyz":
                 arm = float(fmu.read(f"wheel[{k + 1}].position.{axis}")) - float(fmu.read(f"body.position.{axis}"))
@@ -155,7 +156,7 @@ def _contact(scenario: Scenario, s: float) -> Contact:
 def graph(scenario: Scenario, exchange: str) -> Graph:
     """Return the graph of loaded FMUs: cable, robot, one contact a wheel, connected by the contract.
 
-    `waveform` becomes `hermite` where cable or robot does not give its means.
+    `waveform` becomes `hermite` where cable or robot does not give its means, `point` where one takes no slopes.
     """
     assert scenario.cable is not None and scenario.robot is not None
     resolved, (_, placement) = parts(scenario), _placed(scenario)
@@ -169,8 +170,7 @@ def graph(scenario: Scenario, exchange: str) -> Graph:
         if not all(f"initial.position.{axis}" in initial for axis in "yz"):
             raise InputError(f"{robot}: has no parameters initial.position.*: the robot cannot be placed")
         components["robot"].set_parameters(dict(scenario.robot.parameters) | initial | scenario.robot.inputs)
-        if exchange == "waveform" and not _gives_means(components):
-            exchange = "hermite"
+        exchange = _possible(exchange, components)
         for k, s in enumerate(placement.arc_lengths, start=1):
             contact = Fmu(scenario.contact.fmu or library.contact_fmu(), f"contact{k}")
             components[f"contact{k}"] = contact
@@ -189,9 +189,16 @@ def _inner_step(scenario: Scenario, exchange: str) -> dict[str, Value]:
     return {"integration_step": step} if scenario.cable.fmu is None else {}
 
 
-def _gives_means(components: Mapping[str, Fmu]) -> bool:
+def _possible(exchange: str, components: Mapping[str, Fmu]) -> str:
+    """Return `exchange`, or the best that cable and robot admit.
+
+    Without inputs for slopes only `point` is left: a mean force that is held feeds the contact's vibration.
+    """
     cable, robot = components["cable"].ports, components["robot"].ports
-    return "port[1].position_mean.x" in cable and "wheel[1].rotation_mean.x" in robot
+    if not ("port[1].force_rate.x" in cable and "wheel[1].force_rate.x" in robot):
+        return "point"
+    means = "port[1].position_mean.x" in cable and "wheel[1].rotation_mean.x" in robot
+    return "hermite" if exchange == "waveform" and not means else exchange
 
 
 def _connections(components: Mapping[str, Fmu], exchange: str) -> list[Connection]:

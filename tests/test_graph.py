@@ -19,8 +19,8 @@ REFUSED = [
     ("a.gain", "b.u", "is no output but parameter"),
     ("a.x", "b.u", "unit m.s is no measure of m"),
     ("a.angle", "b.u", "unit deg is no measure of m"),
-    ("a.y", "b.count_in", "real cannot feed integer"),
-    ("a.flag", "b.count_in", "boolean cannot feed integer"),
+    ("a.y", "b.count_in", "Real cannot feed Integer"),
+    ("a.flag", "b.count_in", "Boolean cannot feed Integer"),
 ]
 
 
