@@ -13,12 +13,14 @@ import hashlib
 import os
 import re
 import tempfile
+import zipfile
 from collections.abc import Iterable, Mapping, Sequence
 from ctypes import c_void_p
 from dataclasses import dataclass
 from pathlib import Path
 from time import perf_counter
 from typing import Any, Literal
+from xml.etree import ElementTree
 
 import fmpy
 import numpy as np
@@ -411,7 +413,16 @@ def _read(path: Path) -> tuple[ModelDescription, str]:
         raise ValueError(f"{path}: no co-simulation FMU; export it for co-simulation")
     if str(description.fmiVersion).startswith("1"):
         raise ValueError(f"{path}: FMI {description.fmiVersion} is not supported; export it for FMI 2.0 or 3.0")
+    if str(description.fmiVersion).startswith("3"):
+        description.coSimulation.providesDirectionalDerivative = _provides_derivatives(path)
     return description, sha256
+
+
+def _provides_derivatives(path: Path) -> bool:
+    """Return what an FMI 3.0 description says; FMPy 0.3 looks for the attribute under its name in FMI 2.0."""
+    with zipfile.ZipFile(path) as archive, archive.open("modelDescription.xml") as file:
+        interface = ElementTree.parse(file).find("CoSimulation")
+    return interface is not None and interface.get("providesDirectionalDerivatives") in ("true", "1")
 
 
 def _capabilities(description: ModelDescription) -> Capabilities:

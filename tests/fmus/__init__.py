@@ -52,11 +52,11 @@ def compiler() -> str | None:
 
 @cache
 def compiled(name: str) -> Path:
-    """Compile a test FMU in C, ``lag2`` (FMI 2.0) or ``lag3`` (FMI 3.0), on Linux; return it."""
+    """Compile a test FMU in C, ``lag2``, ``field2`` … (FMI 2.0) or ``lag3``, ``field3`` (FMI 3.0), on Linux; return it."""
     library, path = _folder() / f"{name}.so", _folder() / f"{name}.fmu"
     text = (SCRIPTS / f"{name}.c").read_text(encoding="utf-8")
     prefix, interfaces = ("fmi2", [FMU2Slave, FMU2Model])
-    if name == "lag3":
+    if name.endswith("3"):
         prefix, interfaces = "fmi3", [FMU3Slave, FMU3Model, FMU3ScheduledExecution]
     known = {n for interface in interfaces for n in dir(interface) if n.startswith(prefix)}
     # the standard wants every function there; those that are not used answer with an error
@@ -67,7 +67,8 @@ def compiled(name: str) -> Path:
     )
     source = _folder() / f"{name}.c"
     source.write_text(text, encoding="utf-8")
-    subprocess.run([str(compiler()), "-shared", "-fPIC", "-O1", str(source), "-o", str(library)], check=True)
+    options = ["-shared", "-fPIC", "-O1", f"-I{SCRIPTS}", str(source), "-o", str(library), "-lm"]
+    subprocess.run([str(compiler()), *options], check=True)
     folder = platform if prefix == "fmi2" else platform_tuple
     with zipfile.ZipFile(path, "w") as archive:
         archive.write(SCRIPTS / f"{name}.xml", "modelDescription.xml")
