@@ -2,7 +2,7 @@
 
 They hold at a communication point: in Initialization Mode for the initial unknowns as functions of the inputs, later for
 outputs and state derivatives as functions of inputs and continuous states at that instant (FMI 2.0.5, 2.1.9, 2.2.8 and
-4.3.1; FMI 3.0.2, 2.2.11 and 2.4.8). The response of an output over a step is another thing: see
+4.3.1; FMI 3.0, 2.2.12 and 2.4.8). The response of an output over a step is another thing: see
 `orchestrator.masters.jacobian`.
 """
 

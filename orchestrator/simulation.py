@@ -194,6 +194,7 @@ class _Run:
         except BaseException as error:  # goes on in the caller's thread
             self.failure = error
         finally:
+            self.master.finish()
             if self.work.names and self.work in self.graph.observers:
                 self.graph.observers.remove(self.work)
 
@@ -215,6 +216,8 @@ class _Run:
             if self.abandoned:
                 return
             report = step(t, H)
+            if self.abandoned:  # it came back after all
+                return
             self.recorder.read(log.values[i + 1])
             log.steps.append(report)
             if book:

@@ -14,7 +14,7 @@ from typing import Any, ClassVar
 import numpy as np
 
 from orchestrator.fmu import ERROR, FmuError, Group, Port, State
-from orchestrator.graph import Graph
+from orchestrator.graph import Graph, Node
 from orchestrator.masters.base import Between, Loads, Master, StepReport, require_rollback, step_node
 from orchestrator.masters.predictor import Predictor
 from orchestrator.masters.scale import Scale
@@ -61,6 +61,7 @@ class Implicit(Master):
     max_depth : the macro step is halved at most so often
     predictor : order of the prediction of the unknowns, or -1: the one that did best lately
     local_tolerance : if positive, sub-steps are made as short as this local error asks for (see `StepControl`)
+    parallel : components that need nothing of one another in threads: ``auto`` (where it pays), ``always`` or ``never``
     """
 
     IMPLICIT: ClassVar[bool] = True
@@ -77,8 +78,9 @@ class Implicit(Master):
         max_depth: int = 6,
         predictor: int = -1,
         local_tolerance: float = 0.0,
+        parallel: str = "auto",
     ):
-        super().__init__(graph)
+        super().__init__(graph, parallel=parallel)
         require_rollback(graph, self.NAME)
         self.accelerator = accelerator
         self.tolerance, self.max_iterations, self.max_depth = tolerance, max_iterations, max_depth
@@ -243,9 +245,12 @@ class Implicit(Master):
     def _evaluate(self, t: float, H: float, x: np.ndarray) -> None:
         graph = self.graph
         graph.u[self.places] = x
-        for node in graph.nodes:
+
+        def step(node: Node) -> None:
             node.receive(graph.y)
             step_node(self.between, node, t, H)
+
+        self.crew.round(step)
 
 
 def _is_real_output(port: Port) -> bool:
