@@ -238,7 +238,7 @@ def _simulated(scenario: Scenario, graph: Graph, progress: Progress) -> Log:
         try:
             master = MASTERS[simulation.master](graph, **scenario.master)
             times = 0.0, simulation.stop_time, simulation.macro_step
-            return simulate(graph, master, *times, record=recorded(graph), on_step=on_step)
+            return simulate(graph, master, *times, recorded(graph), on_step, simulation.timeout)
         except (ValueError, TypeError) as error:
             raise InputError(f"{scenario.path}: {error}") from None
         except FmuError as error:
@@ -404,6 +404,13 @@ def compared(runs: list[Coupled], reference: Reference) -> Comparison:
     """Hold all runs against the reference."""
     tolerance = runs[0].scenario.simulation.tolerances
     return Comparison(reference, [held_against(coupled, reference) for coupled in runs], dict(tolerance))
+
+
+def write_runs(directory: RunDirectory, runs: list[Coupled], error: str) -> None:
+    """Write the runs of a comparison that could not be finished, a directory each, then the manifest with `error`."""
+    for coupled in runs:
+        write(RunDirectory(directory.path / coupled.label), coupled)
+    directory.write_manifest(manifest(runs[0].scenario, runs[0].fmus), error=error)
 
 
 def write_comparison(directory: RunDirectory, comparison: Comparison, runs: list[Coupled]) -> None:

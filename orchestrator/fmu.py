@@ -263,6 +263,7 @@ class Fmu:
     solves, wall : steps made and the seconds spent in them
     time : s, start of the last step
     busy_since : clock at which the running call began, 0 when none runs
+    abandoned : a call of this run was given up and may still return: nothing of it may be touched any more
     """
 
     def __init__(self, path: str | Path, name: str | None = None):
@@ -274,6 +275,7 @@ class Fmu:
         self.log: list[str] = []
         self.parameters: dict[str, Value] = {}
         self.solves, self.wall, self.time, self.busy_since = 0, 0.0, 0.0, 0.0
+        self.abandoned = False
         binding = Fmi3 if str(self.description.fmiVersion).startswith("3") else Fmi2
         try:
             self.fmi = binding(self.description, unzip(self.path, self.sha256), self.name, self._message)
@@ -440,10 +442,15 @@ _instances: list[Fmu] = []
 _libraries: list[Any] = []
 
 
+def any_abandoned() -> bool:
+    """Return whether a call of any FMU was given up."""
+    return any(fmu.abandoned for fmu in _instances)
+
+
 @atexit.register
 def _close_all() -> None:
     """Free what is left and end the interpreters that the libraries keep."""
-    if any(fmu.busy_since for fmu in _instances):
+    if any_abandoned() or any(fmu.busy_since for fmu in _instances):
         return  # a call still hangs in there: touching it would hang the exit too
     for fmu in list(_instances):
         fmu.close()

@@ -379,7 +379,9 @@ class Graph:
         return np.array([place.get(suffixed(name, suffix), -1) for name in self.input_names], dtype=np.intp)
 
     def close(self) -> None:
-        """Free all instances."""
+        """Free all instances; none if a call was given up, for it may return and go on with the others."""
+        if any(fmu.abandoned for fmu in self.components.values()):  # type: ignore[union-attr]
+            return
         for fmu in self.components.values():  # type: ignore[union-attr]
             fmu.close()
 

@@ -56,7 +56,8 @@ NonNegative = Annotated[float, Field(ge=0.0)]
 class Simulation(Section):
     """Times in s. `tolerances`: the largest `relative_max_error` that `compare` lets pass, by signal.
 
-    `estimate`: whether and how `run` estimates the error of those signals (docs/estimate.md).
+    `estimate`: whether and how `run` estimates the error of those signals (docs/estimate.md). `timeout`: wall time that an
+    FMU may take for one step or its initialisation; none: as long as it likes.
     """
 
     stop_time: Positive
@@ -65,6 +66,7 @@ class Simulation(Section):
     exchange: Literal["point", "hermite", "waveform"] | None = None
     tolerances: dict[str, Positive] = {}
     estimate: Literal["richardson", "none"] = "richardson"
+    timeout: Positive | None = None
 
 
 class CableSection(Section):
@@ -204,6 +206,7 @@ SECTIONS: dict[str, type[Section]] = {
 UNITS = {
     "simulation.stop_time": "s",
     "simulation.macro_step": "s",
+    "simulation.timeout": "s",
     "landing.position": "m",
     "landing.height": "m",
     "landing.velocity": "m/s",

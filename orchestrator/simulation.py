@@ -231,6 +231,12 @@ class _Run:
                 self._first = {name: (fmu.wall, fmu.solves) for name, fmu in self.graph.components.items()}
             log.wall = perf_counter() - clock
 
+    def abandon(self) -> None:
+        """Leave the run's thread to itself, and all FMUs to it: the call it waits for may return."""
+        self.abandoned = True
+        for fmu in self.graph.components.values():  # type: ignore[union-attr]
+            fmu.abandoned = True
+
     def finish(self) -> None:
         """Cut the log to what was reached; raise what was no failure of an FMU."""
         if self.failure is not None:
@@ -256,19 +262,20 @@ def _watched(run: _Run, start: float, stop: float, timeout: float) -> None:
     """Run in a thread; give up when one call of an FMU lasts longer than `timeout` (s)."""
     thread = threading.Thread(target=run, args=(start, stop), daemon=True)
     thread.start()
+    fmus = run.graph.components.values()  # type: ignore[union-attr]
     try:
         while thread.is_alive():
             thread.join(min(timeout / 4, 0.25))
-            hung = [
-                f for f in run.graph.components.values() if f.busy_since and perf_counter() - f.busy_since > timeout
-            ]
+            given = perf_counter() - timeout
+            hung = [fmu for fmu in fmus if 0.0 < fmu.busy_since < given]
             if hung and thread.is_alive():
-                run.abandoned = True
-                fmu = hung[0]
-                run.log.error = FmuError(
-                    fmu.name, fmu.time, TIMEOUT, f"no answer within {timeout:g} s; raise the time-out?"
-                )
+                message = f"no answer within {timeout:g} s; raise the time-out?"
+                run.log.error = FmuError(hung[0].name, hung[0].time, TIMEOUT, message)
+                run.abandon()
                 return
     except BaseException:
         run.abandoned = True
+        thread.join(timeout)
+        if thread.is_alive():
+            run.abandon()
         raise
