@@ -90,13 +90,14 @@ class Port:
 
 @dataclass(frozen=True)
 class Capabilities:
-    """What the FMU says it can do."""
+    """What the FMU says it can do; `internal_step`: its fixed internal step, s (FMI 3.0)."""
 
     rollback: bool
     serialize: bool
     variable_step: bool
     directional_derivatives: bool
     input_derivatives: bool
+    internal_step: float | None = None
 
 
 def nearest(name: str, known: Iterable[str]) -> str:
@@ -376,6 +377,11 @@ class Fmu:
         if status > WARNING:
             raise self.error(status, f"the step of {h:.6g} s")
 
+    def allows(self, h: float, H: float) -> bool:
+        """Return whether steps `h` can be made where the master's own are `H`, s."""
+        internal = self.capabilities.internal_step
+        return self.capabilities.variable_step and not (internal and abs(h / internal - round(h / internal)) > 1e-6)
+
     def save(self) -> State:
         """Return a handle on the complete state; to be given to `release` in the end."""
         state = c_void_p()
@@ -435,6 +441,7 @@ def _capabilities(description: ModelDescription) -> Capabilities:
         variable_step=bool(interface.canHandleVariableCommunicationStepSize),
         directional_derivatives=bool(interface.providesDirectionalDerivative),
         input_derivatives=bool(interface.canInterpolateInputs) and str(description.fmiVersion).startswith("2"),
+        internal_step=float(interface.fixedInternalStepSize) if interface.fixedInternalStepSize else None,
     )
 
 

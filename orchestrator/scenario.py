@@ -50,6 +50,7 @@ def _scalar(value: Any) -> Scalar:
 
 Settings = dict[str, Annotated[Any, AfterValidator(_scalar)]]
 Positive = Annotated[float, Field(gt=0.0)]
+Count = Annotated[int, Field(ge=1)]
 NonNegative = Annotated[float, Field(ge=0.0)]
 
 
@@ -70,10 +71,14 @@ class Simulation(Section):
 
 
 class CableSection(Section):
-    """The cable: parameters by their names in the contract; `fmu` is a foreign one instead of ours."""
+    """The cable: parameters by their names in the contract; `fmu` is a foreign one instead of ours.
+
+    `steps`, here and below: steps that the FMU makes in each step of the master (docs/masters.md).
+    """
 
     fmu: str | None = None
     stiffness_set: str = "unnamed"
+    steps: Count = 1
     parameters: Settings = {}
 
 
@@ -85,6 +90,7 @@ class RobotSection(Section):
 
     model: str | None = None
     fmu: str | None = None
+    steps: Count = 1
     parameters: Settings = {}
     inputs: Settings = {}
 
@@ -122,6 +128,7 @@ class Component(Section):
 
     model: str | None = None
     fmu: str | None = None
+    steps: Count = 1
     parameters: Settings = {}
     inputs: Settings = {}
 

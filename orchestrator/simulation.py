@@ -12,6 +12,7 @@ import numpy as np
 from orchestrator.fmu import TIMEOUT, FmuError, Group, nearest
 from orchestrator.graph import Graph
 from orchestrator.masters.base import Master, StepReport
+from orchestrator.sub_steps import check_steps
 from orchestrator.work import Work
 
 DIVIDES = 1e-9  # how far (stop - start)/H may be from a whole number
@@ -141,9 +142,10 @@ def simulate(
     Raises
     ------
     ValueError
-        if `H` does not divide the time, or a signal does not exist
+        if `H` does not divide the time, does not suit an FMU's internal step, or a signal does not exist
     """
     n = _steps(start, stop, H)
+    check_steps(graph.components, H)  # type: ignore[arg-type]
     recorder = Recorder(graph, record)
     time, values = start + H * np.arange(n + 1), np.full((n + 1, len(recorder.signals)), np.nan)
     log = Log(master.NAME, H, recorder.signals, time, values)

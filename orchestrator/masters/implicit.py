@@ -14,7 +14,7 @@ from typing import Any, ClassVar
 import numpy as np
 
 from orchestrator.fmu import ERROR, FmuError, Group, Port, State
-from orchestrator.graph import Graph, Node
+from orchestrator.graph import Graph, GraphError, Node
 from orchestrator.masters.base import Between, Loads, Master, StepReport, require_rollback, step_node
 from orchestrator.masters.predictor import Predictor
 from orchestrator.masters.scale import Scale
@@ -89,6 +89,8 @@ class Implicit(Master):
         self.predictor = Predictor(predictor)
         self.scale = Scale(graph, self.loads, absolute, lever)
         self.places = graph.torn
+        if local_tolerance > 0.0:
+            self._require_variable_steps()
         self.control = StepControl(self, local_tolerance, absolute, max_depth) if local_tolerance > 0.0 else None
 
     def start(self, t: float) -> None:
@@ -135,6 +137,7 @@ class Implicit(Master):
     def advance(self, t: float, H: float, depth: int, report: StepReport) -> None:
         """Advance by `H`, by halves if the iteration does not converge."""
         self.graph.exchange_discrete()
+        self.failure = None
         states = self.graph.save()
         try:
             last = depth == self.max_depth
@@ -145,6 +148,7 @@ class Implicit(Master):
                 report.residual = max(report.residual, residual)
                 self._accept(t, H)
                 return
+            self._require_halves(t, H, depth)
             self.graph.restore(states)
             self.graph.u[:] = start_values
         finally:
@@ -152,6 +156,30 @@ class Implicit(Master):
         report.subdivisions += 1
         self.advance(t, H / 2, depth + 1, report)
         self.advance(t + H / 2, H / 2, depth + 1, report)
+
+    def _require_variable_steps(self) -> None:
+        """Raise `GraphError` if steps cannot be adaptive."""
+        fixed = [
+            n.name for n in self.graph.nodes if not n.fmu.capabilities.variable_step or n.fmu.capabilities.internal_step
+        ]
+        if fixed:
+            raise GraphError(
+                f"master {self.NAME}: local_tolerance varies the step, which {', '.join(fixed)} cannot "
+                "(canHandleVariableCommunicationStepSize is false, or fixedInternalStepSize is given); leave it out"
+            )
+
+    def _require_halves(self, t: float, H: float, depth: int) -> None:
+        """Raise `FmuError` if a component cannot be stepped by half of `H`, the macro step halved `depth` times."""
+        for node in self.graph.nodes:
+            if not node.fmu.allows(H / 2, H * 2**depth):
+                cause = self.failure.message if self.failure is not None else "it does not converge"
+                raise FmuError(
+                    node.name,
+                    t,
+                    ERROR,
+                    f"the step of {H:.6g} s would have to be halved ({cause}), but {node.name} cannot vary its step; "
+                    "choose a smaller macro step, or max_depth = 0 to go on with the best iterate",
+                )
 
     def snapshot(self) -> tuple[Any, ...]:
         """Return all that a step changes, the states of the components first (to be released)."""

@@ -19,6 +19,7 @@ from scipy.linalg import expm
 
 from orchestrator.fmu import Fmu
 from orchestrator.graph import Connection, Graph
+from orchestrator.sub_steps import instance
 
 SCRIPTS = Path(__file__).resolve().parent
 OPTIONS = {"canGetAndSetFMUstate": True, "canSerializeFMUstate": True, "needsExecutionTool": False}
@@ -76,11 +77,11 @@ def compiled(name: str) -> Path:
     return path
 
 
-def fmu(kind: str, name: str, *, rollback: bool = True, **parameters: float | int | str) -> Fmu:
+def fmu(kind: str, name: str, *, rollback: bool = True, steps: int = 1, **parameters: float | int | str) -> Fmu:
     """Return an instance of a test FMU with parameters set."""
-    instance = Fmu(build(kind, rollback=rollback), name)
-    instance.set_parameters(parameters)
-    return instance
+    made = instance(build(kind, rollback=rollback), name, steps)
+    made.set_parameters(parameters)
+    return made
 
 
 MILD = {"stiffness": 100.0, "damping": 1.0, "ground": 1000.0, "start": (0.1, 0.0)}
@@ -96,13 +97,16 @@ def oscillator(
     *,
     waveform: bool = False,
     rollback: bool = True,
+    steps: tuple[int, int] = (1, 1),
 ) -> Graph:
     """Return two masses on springs to ground, coupled by a spring that belongs to the second one
-    (force-displacement)."""
-    a = fmu("link", "a", rollback=rollback, mass=MASS, ground_stiffness=GROUND, initial_position=start[0])
+    (force-displacement), with their sub-steps."""
+    own = {"mass": MASS, "ground_stiffness": GROUND, "initial_position": start[0]}
+    a = fmu("link", "a", rollback=rollback, steps=steps[0], **own)
     b = fmu(
         "wave" if waveform else "link",
         "b",
+        steps=steps[1],
         mass=MASS,
         ground_stiffness=ground,
         ground_damping=GROUND_DAMPING,
