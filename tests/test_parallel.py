@@ -3,7 +3,7 @@
 from __future__ import annotations
 
 import threading
-from time import perf_counter
+from time import perf_counter, sleep
 
 import numpy as np
 import pytest
@@ -110,11 +110,17 @@ def test_errors_are_those_of_serial_stepping(master: str, failing: tuple[str, ..
 
 
 def test_time_out_names_the_one_that_hangs():
-    graph = lags(q={"duration": 0.8})
+    before, graph = threading.active_count(), lags(q={"duration": 0.8})
     master = MASTERS["jacobi"](graph, parallel="always")
     log = simulate(graph, master, 0.0, 0.1, 0.01, timeout=0.2)
     assert log.error is not None
     assert (log.error.component, log.error.status, len(log.time)) == ("q", TIMEOUT, 1)
+    while threading.active_count() > before:  # the call returns, and all threads that waited for it end
+        sleep(0.05)
+    for part in graph.components.values():
+        assert part.abandoned
+        part.abandoned = False
+    graph.close()
 
 
 def test_choices():

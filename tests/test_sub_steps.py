@@ -11,9 +11,12 @@ from pathlib import Path
 import numpy as np
 import pytest
 
+from orchestrator import experiment
+from orchestrator.errors import InputError
 from orchestrator.fmu import Fmu
 from orchestrator.graph import Connection, Graph, GraphError
 from orchestrator.masters import MASTERS
+from orchestrator.scenario import load
 from orchestrator.simulation import simulate
 from orchestrator.sub_steps import SubStepped
 from tests.fmus import MILD, compiled, compiler, fmu, oscillator, oscillator_solution
@@ -21,6 +24,7 @@ from tests.test_fmu import described, started
 from tests.test_masters import IMPLICIT, ITERATED, POINT, POSITIONS, faulty_oscillator, run
 
 needs_compiler = pytest.mark.skipif(compiler() is None, reason="no C compiler on this machine")
+OSCILLATOR = Path(__file__).resolve().parents[1] / "scenarios" / "oscillator.toml"
 VARIES = 'canHandleVariableCommunicationStepSize="true"'
 
 
@@ -173,3 +177,19 @@ def test_a_fixed_internal_step_must_divide_the_communication_step(tmp_path: Path
             with pytest.raises(ValueError, match=r"no multiple of its fixed internal step of 0\.002 s; change"):
                 simulate(graph, master, 0.0, 0.02, H)
         graph.close()
+
+
+def test_steps_in_a_scenario():
+    """The oscillator with three steps of the right one: the same motion to the scenario's tolerance, three times its solves."""
+    runs = []
+    for steps in (1, 3):
+        scenario = load(OSCILLATOR, ["simulation.stop_time=0.5", f"components.right.steps={steps}"])
+        coupled = experiment.run(scenario)
+        assert coupled.log.error is None
+        runs.append(coupled)
+    assert [run.log.solves["right"] // run.log.solves["left"] for run in runs] == [1, 3]
+    motions = [run.table["right.position"] for run in runs]
+    tolerance = runs[0].scenario.simulation.tolerances["right.position"]
+    assert motions[1] == pytest.approx(motions[0], abs=tolerance * np.ptp(motions[0]))
+    with pytest.raises(InputError, match=r"components\.right\.steps: 0 must be greater than or equal to 1"):
+        load(OSCILLATOR, ["components.right.steps=0"])
