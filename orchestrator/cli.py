@@ -16,7 +16,7 @@ from typing import TYPE_CHECKING, Annotated, Any
 import typer
 from typer.core import TyperGroup
 
-from orchestrator.errors import DONE, FAILED, INTERRUPTED, MISSED, InputError, OrchestratorError
+from orchestrator.errors import DONE, FAILED, INTERRUPTED, MISSED, InputError, OrchestratorError, RunError
 
 if TYPE_CHECKING:
     from orchestrator.compare import Comparison
@@ -58,6 +58,7 @@ Robot = Annotated[str | None, typer.Option(metavar="NAME|FILE.fmu", help="Anothe
 MasterName = Annotated[str | None, typer.Option(help="Another master, see `orchestrator list`.")]
 MacroStep = Annotated[float | None, typer.Option(help="Another macro step, s.")]
 Stop = Annotated[float | None, typer.Option(help="Another stop time, s.")]
+Timeout = Annotated[float | None, typer.Option(help="Wall time that one step of an FMU may take, s.")]
 Set = Annotated[
     list[str] | None,
     typer.Option("--set", metavar="KEY=VALUE", help="Another value, e.g. robot.parameters.mass=12; repeatable."),
@@ -135,6 +136,7 @@ def run(
     master: MasterName = None,
     macro_step: MacroStep = None,
     stop: Stop = None,
+    timeout: Timeout = None,
     set_: Set = None,
     quiet: Quiet = False,
 ) -> None:
@@ -142,7 +144,7 @@ def run(
     from orchestrator import experiment
     from orchestrator.results import RunDirectory
 
-    loaded = _load(scenario, robot, set_, master, macro_step, stop)
+    loaded = _load(scenario, robot, set_, master, macro_step, stop, timeout)
     path = _free(out, loaded.name)
     with _progress(quiet) as show:
         coupled = experiment.run(loaded, show(_task(loaded), loaded.simulation.stop_time))
@@ -163,6 +165,7 @@ def compare(
     master: MasterName = None,
     macro_step: MacroStep = None,
     stop: Stop = None,
+    timeout: Timeout = None,
     set_: Set = None,
     masters: Annotated[str | None, typer.Option(metavar="A,B,…", help="Masters to compare.")] = None,
     macro_steps: Annotated[str | None, typer.Option(metavar="H,H,…", help="Macro steps to compare, s.")] = None,
@@ -172,13 +175,21 @@ def compare(
     from orchestrator import experiment
     from orchestrator.results import RunDirectory
 
-    first = _load(scenario, robot, set_, master, macro_step, stop)
-    variants = _variants(first, masters, macro_steps, lambda m, h: _load(scenario, robot, set_, m, h, stop))
-    path = _free(out, f"{first.name}-compare")
+    first = _load(scenario, robot, set_, master, macro_step, stop, timeout)
+    variants = _variants(first, masters, macro_steps, lambda m, h: _load(scenario, robot, set_, m, h, stop, timeout))
+    path, runs = _free(out, f"{first.name}-compare"), []
     steps = sorted({v.simulation.macro_step for v in variants})
-    with _progress(quiet) as show:
-        runs = [experiment.run(v, show(_task(v), v.simulation.stop_time)) for v in variants]
-        reference = experiment.reference(first, steps, show("reference", first.simulation.stop_time))
+    try:
+        with _progress(quiet) as show:
+            for v in variants:
+                runs.append(experiment.run(v, show(_task(v), v.simulation.stop_time)))
+            reference = experiment.reference(first, steps, show("reference", first.simulation.stop_time))
+    except RunError as error:
+        if runs:
+            experiment.write_runs(RunDirectory(path), runs, str(error))
+            _status(runs, within=True)
+            print(f"results so far in {path}")
+        raise
     comparison = experiment.compared(runs, reference)
     experiment.write_comparison(RunDirectory(path), comparison, runs)
     _print_comparison(comparison)
@@ -236,11 +247,12 @@ def _load(
     master: str | None = None,
     macro_step: float | None = None,
     stop: float | None = None,
+    timeout: float | None = None,
 ) -> Scenario:
     """Return the scenario with the options of the command line in place of its own values."""
     from orchestrator.scenario import load
 
-    options = {"macro_step": macro_step, "stop_time": stop}
+    options = {"macro_step": macro_step, "stop_time": stop, "timeout": timeout}
     settings = [f"simulation.{key}={float(value)!r}" for key, value in options.items() if value is not None]
     return load(path, [*settings, *(overrides or [])], robot, master)
 
@@ -411,7 +423,21 @@ def _complain(message: str) -> None:
 
 def main(arguments: list[str] | None = None) -> None:
     """Run the command line and end the process with its exit status."""
-    app(arguments)
+    try:
+        app(arguments)
+    except SystemExit as end:
+        if _left_behind():
+            # the thread that waits for an FMU which hangs cannot be ended; only the process can
+            sys.stdout.flush()
+            sys.stderr.flush()
+            os._exit(end.code if isinstance(end.code, int) else FAILED)
+        raise
+
+
+def _left_behind() -> bool:
+    """Whether a call of an FMU was given up; nothing is imported for the question."""
+    module = sys.modules.get("orchestrator.fmu")
+    return module is not None and module.any_abandoned()
 
 
 if __name__ == "__main__":

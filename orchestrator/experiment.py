@@ -35,6 +35,7 @@ from orchestrator.report import Record, draw_comparison, draw_run, run_label
 from orchestrator.results import RunDirectory, Table
 from orchestrator.scenario import Scenario
 from orchestrator.simulation import Log, simulate
+from orchestrator.sub_steps import check_steps, instance
 
 LEFT_THE_GROOVE = 3
 """Value of a contact's `status` when the cable has left the groove."""
@@ -125,6 +126,7 @@ def opened(scenario: Scenario) -> Iterator[Graph]:
     try:
         _require_contract(scenario)
         graph = landing.graph(scenario, exchange_of(scenario)) if scenario.is_landing else _general_graph(scenario)
+        check_steps(graph.components, scenario.simulation.macro_step)  # type: ignore[arg-type]
     except (ModuleError, ValueError) as error:
         raise InputError(f"{scenario.path}: {line}" for line in str(error).splitlines()) from None
     except FmuError as error:
@@ -151,7 +153,8 @@ def _general_graph(scenario: Scenario) -> Graph:
     components: dict[str, Fmu] = {}
     try:
         for name, section in scenario.components.items():
-            components[name] = Fmu(section.fmu or library.module_fmu(str(section.model)), name)
+            file = section.fmu or library.module_fmu(str(section.model))
+            components[name] = instance(file, name, section.steps)
             components[name].set_parameters({**section.parameters, **section.inputs})
         return Graph(components, [_connection(text) for text in scenario.connections])
     except BaseException:
@@ -251,7 +254,7 @@ def _simulated(scenario: Scenario, graph: Graph, progress: Progress) -> Log:
         try:
             master = MASTERS[simulation.master](graph, **scenario.master)
             times = 0.0, simulation.stop_time, simulation.macro_step
-            return simulate(graph, master, *times, record=recorded(graph), on_step=on_step)
+            return simulate(graph, master, *times, recorded(graph), on_step, simulation.timeout)
         except (ValueError, TypeError) as error:
             raise InputError(f"{scenario.path}: {error}") from None
         except FmuError as error:
@@ -313,7 +316,10 @@ def _fine_reference(scenario: Scenario, macro_steps: list[float], progress: Prog
 
 
 def _completed(scenario: Scenario, progress: Progress) -> Coupled:
-    coupled = run(scenario, progress)
+    try:
+        coupled = run(scenario, progress)
+    except InputError as error:  # an FMU that cannot be stepped so finely
+        raise RunError(f"no reference with a macro step of {scenario.simulation.macro_step:g} s: {error}") from None
     if coupled.log.error is not None:
         raise RunError(str(coupled.log.error), coupled.log.error.time)
     return coupled
@@ -417,6 +423,13 @@ def compared(runs: list[Coupled], reference: Reference) -> Comparison:
     """Hold all runs against the reference."""
     tolerance = runs[0].scenario.simulation.tolerances
     return Comparison(reference, [held_against(coupled, reference) for coupled in runs], dict(tolerance))
+
+
+def write_runs(directory: RunDirectory, runs: list[Coupled], error: str) -> None:
+    """Write the runs of a comparison that could not be finished, a directory each, then the manifest with `error`."""
+    for coupled in runs:
+        write(RunDirectory(directory.path / coupled.label), coupled)
+    directory.write_manifest(manifest(runs[0].scenario, runs[0].fmus), error=error)
 
 
 def write_comparison(directory: RunDirectory, comparison: Comparison, runs: list[Coupled]) -> None:

@@ -14,12 +14,14 @@ import logging
 import os
 import re
 import tempfile
+import zipfile
 from collections.abc import Iterable, Mapping, Sequence
 from ctypes import c_void_p
 from dataclasses import dataclass
 from pathlib import Path
 from time import perf_counter
 from typing import Any, Literal
+from xml.etree import ElementTree
 
 import fmpy
 import numpy as np
@@ -93,13 +95,14 @@ class Port:
 
 @dataclass(frozen=True)
 class Capabilities:
-    """What the FMU says it can do."""
+    """What the FMU says it can do; `internal_step`: its fixed internal step, s (FMI 3.0)."""
 
     rollback: bool
     serialize: bool
     variable_step: bool
     directional_derivatives: bool
     input_derivatives: bool
+    internal_step: float | None = None
 
 
 def nearest(name: str, known: Iterable[str]) -> str:
@@ -278,6 +281,7 @@ class Fmu:
     time : s, start of the last step
     busy_since : clock at which the running call began, 0 when none runs
     worst : highest FMI status that a call came back with, beyond warning
+    abandoned : a call of this run was given up and may still return: nothing of it may be touched any more
     """
 
     def __init__(self, path: str | Path, name: str | None = None):
@@ -291,6 +295,7 @@ class Fmu:
         self.solves, self.wall, self.time, self.busy_since = 0, 0.0, 0.0, 0.0
         self.worst, self.initialized = 0, False
         _require_possible(self)
+        self.abandoned = False
         binding = Fmi3 if str(self.description.fmiVersion).startswith("3") else Fmi2
         try:
             with contextlib.chdir("."):  # FMPy stays in the library's folder if that cannot be loaded
@@ -408,6 +413,11 @@ class Fmu:
         if status > WARNING:
             raise self.error(status, f"the step of {h:.6g} s")
 
+    def allows(self, h: float, H: float) -> bool:
+        """Return whether steps `h` can be made where the master's own are `H`, s."""
+        internal = self.capabilities.internal_step
+        return self.capabilities.variable_step and not (internal and abs(h / internal - round(h / internal)) > 1e-6)
+
     def save(self) -> State:
         """Return a handle on the complete state; to be given to `release` in the end."""
         state = c_void_p()
@@ -466,7 +476,16 @@ def _read(path: Path) -> tuple[ModelDescription, str]:
         raise ValueError(f"{path}: no co-simulation FMU; export it for co-simulation")
     if str(description.fmiVersion).startswith("1"):
         raise ValueError(f"{path}: FMI {description.fmiVersion} is not supported; export it for FMI 2.0 or 3.0")
+    if str(description.fmiVersion).startswith("3"):
+        description.coSimulation.providesDirectionalDerivative = _provides_derivatives(path)
     return description, sha256
+
+
+def _provides_derivatives(path: Path) -> bool:
+    """Return what an FMI 3.0 description says; FMPy 0.3 looks for the attribute under its name in FMI 2.0."""
+    with zipfile.ZipFile(path) as archive, archive.open("modelDescription.xml") as file:
+        interface = ElementTree.parse(file).find("CoSimulation")
+    return interface is not None and interface.get("providesDirectionalDerivatives") in ("true", "1")
 
 
 def _capabilities(description: ModelDescription) -> Capabilities:
@@ -477,6 +496,7 @@ def _capabilities(description: ModelDescription) -> Capabilities:
         variable_step=bool(interface.canHandleVariableCommunicationStepSize),
         directional_derivatives=bool(interface.providesDirectionalDerivative),
         input_derivatives=bool(interface.canInterpolateInputs) and str(description.fmiVersion).startswith("2"),
+        internal_step=float(interface.fixedInternalStepSize) if interface.fixedInternalStepSize else None,
     )
 
 
@@ -484,10 +504,15 @@ _instances: list[Fmu] = []
 _libraries: list[Any] = []
 
 
+def any_abandoned() -> bool:
+    """Return whether a call of any FMU was given up."""
+    return any(fmu.abandoned for fmu in _instances)
+
+
 @atexit.register
 def _close_all() -> None:
     """Free what is left and end the interpreters that the libraries keep."""
-    if any(fmu.busy_since for fmu in _instances):
+    if any_abandoned() or any(fmu.busy_since for fmu in _instances):
         return  # a call still hangs in there: touching it would hang the exit too
     for fmu in list(_instances):
         fmu.close()

@@ -7,6 +7,7 @@ iteration of a macro step.
 
 from __future__ import annotations
 
+import contextlib
 from collections.abc import Iterable, Mapping, Sequence
 from dataclasses import dataclass, field
 from typing import Any, Protocol
@@ -16,6 +17,7 @@ from fmpy.model_description import Unit
 from scipy.sparse import csr_array
 from scipy.sparse.csgraph import connected_components
 
+from orchestrator.derivatives import Partials
 from orchestrator.fmu import Fmu, FmuError, Group, Port, State, nearest, suffixed
 
 LOOP_ITERATIONS, LOOP_TOLERANCE, DIFFERENCE = 20, 1e-11, 1e-6
@@ -323,22 +325,47 @@ class Graph:
         return self.gathered(self._loop) - z
 
     def _solve_loops(self, start: float) -> None:
-        """Newton's method with differences on the inputs that are part of an algebraic loop."""
+        """Solve for the inputs that are part of an algebraic loop, with derivatives where FMUs give them."""
         z = self.gathered(self._loop)
+        own = [node for node in self.nodes if node.fmu.capabilities.directional_derivatives]
+        # derivatives that are wrong only cost iterations; if too many, differences have the last word
+        with contextlib.suppress(FmuError, np.linalg.LinAlgError):
+            if own and self._newton(z, own):
+                return
+        if self._newton(z, []):
+            return
+        names = ", ".join(self.input_names[i] for i in self._loop[:3])
+        message = f"the algebraic loop through {names} … has no solution near the start values; change them"
+        raise FmuError(self.nodes[0].name, start, 2, message)
+
+    def _newton(self, z: np.ndarray, own: list[Node]) -> bool:
+        """Newton's method from `z` with the derivatives of `own`, else differences; return whether it converged."""
         for _ in range(LOOP_ITERATIONS):
             r = self._loop_residual(z)
             if np.max(np.abs(r) / (np.abs(z) + 1.0)) <= LOOP_TOLERANCE:
                 self.gather()
-                return
-            jacobian = np.empty((z.size, z.size))
-            for j in range(z.size):
+                return True
+            jacobian = np.full((z.size, z.size), np.nan)
+            for node in own:
+                self._own_derivatives(node, jacobian)
+            for j in np.flatnonzero(np.isnan(jacobian[0])):
                 shifted = z.copy()
                 shifted[j] += DIFFERENCE * (1.0 + abs(z[j]))
                 jacobian[:, j] = (self._loop_residual(shifted) - r) / (shifted[j] - z[j])
             z = z - np.linalg.lstsq(jacobian, r, rcond=None)[0]
-        names = ", ".join(self.input_names[i] for i in self._loop[:3])
-        message = f"the algebraic loop through {names} … has no solution near the start values; change them"
-        raise FmuError(self.nodes[0].name, start, 2, message)
+        return False
+
+    def _own_derivatives(self, node: Node, jacobian: np.ndarray) -> None:
+        """Write the columns of the loop's Jacobian that belong to inputs of `node`, if its FMU knows them."""
+        mine = [j for j, place in enumerate(self._loop) if self._inputs[place][0] == node.name]
+        rows = [i for i, place in enumerate(self._loop) if self.links[place].source[0] == node.name]
+        links = [self.links[self._loop[i]] for i in rows]
+        partials = Partials(node.fmu, [k.source[1] for k in links], [self._inputs[self._loop[j]][1] for j in mine])
+        matrix = partials() if mine else None
+        if matrix is None:
+            return
+        jacobian[:, mine] = -np.eye(len(self._loop))[:, mine]
+        jacobian[np.ix_(rows, mine)] += np.array([[k.gain] for k in links]) * matrix
 
     # -- states ---------------------------------------------------------------------------------------------
 
@@ -368,7 +395,9 @@ class Graph:
         return np.array([place.get(suffixed(name, suffix), -1) for name in self.input_names], dtype=np.intp)
 
     def close(self) -> None:
-        """Free all instances."""
+        """Free all instances; none if a call was given up, for it may return and go on with the others."""
+        if any(fmu.abandoned for fmu in self.components.values()):  # type: ignore[union-attr]
+            return
         for fmu in self.components.values():  # type: ignore[union-attr]
             fmu.close()
 

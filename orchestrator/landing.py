@@ -24,6 +24,7 @@ from orchestrator.monolithic import Problem
 from orchestrator.placement import Placement, place
 from orchestrator.robots import RobotSpec, load_robot
 from orchestrator.scenario import Scenario
+from orchestrator.sub_steps import instance
 
 NOT_NEEDED = ("initial.", ".braked", ".inertia", ".axle_direction", "integration_step", "n_wheels", "center_of_mass")
 """Robot parameters that a reference takes at their defaults where a foreign robot does not have them."""
@@ -162,10 +163,10 @@ def graph(scenario: Scenario, exchange: str) -> Graph:
     resolved, (_, placement) = parts(scenario), _placed(scenario)
     components: dict[str, Fmu] = {}
     try:
-        components["cable"] = Fmu(scenario.cable.fmu or library.cable_fmu(), "cable")
+        components["cable"] = instance(scenario.cable.fmu or library.cable_fmu(), "cable", scenario.cable.steps)
         components["cable"].set_parameters(_inner_step(scenario, exchange) | resolved.cable)
         robot = library.robot_fmu(resolved.spec) if resolved.spec is not None else Path(str(scenario.robot.fmu))
-        components["robot"] = Fmu(robot, "robot")
+        components["robot"] = instance(robot, "robot", scenario.robot.steps)
         initial = {n: v for n, v in placement.initial.items() if n in components["robot"].ports}
         if not all(f"initial.position.{axis}" in initial for axis in "yz"):
             raise InputError(f"{robot}: has no parameters initial.position.*: the robot cannot be placed")

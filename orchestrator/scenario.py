@@ -50,13 +50,15 @@ def _scalar(value: Any) -> Scalar:
 
 Settings = dict[str, Annotated[Any, AfterValidator(_scalar)]]
 Positive = Annotated[float, Field(gt=0.0)]
+Count = Annotated[int, Field(ge=1)]
 NonNegative = Annotated[float, Field(ge=0.0)]
 
 
 class Simulation(Section):
     """Times in s. `tolerances`: the largest `relative_max_error` that `compare` lets pass, by signal.
 
-    `estimate`: by which second run `run` estimates the error of those signals, if any (docs/estimate.md).
+    `estimate`: by which second run `run` estimates the error of those signals, if any (docs/estimate.md). `timeout`: wall
+    time that an FMU may take for one step or its initialisation; none: as long as it likes.
     """
 
     stop_time: Positive
@@ -65,13 +67,18 @@ class Simulation(Section):
     exchange: Literal["point", "hermite", "waveform"] | None = None
     tolerances: dict[str, Positive] = {}
     estimate: Literal["finer", "coarser", "none"] = "finer"
+    timeout: Positive | None = None
 
 
 class CableSection(Section):
-    """The cable: parameters by their names in the contract; `fmu` is a foreign one instead of ours."""
+    """The cable: parameters by their names in the contract; `fmu` is a foreign one instead of ours.
+
+    `steps`, here and below: steps that the FMU makes in each step of the master (docs/masters.md).
+    """
 
     fmu: str | None = None
     stiffness_set: str = "unnamed"
+    steps: Count = 1
     parameters: Settings = {}
 
 
@@ -83,6 +90,7 @@ class RobotSection(Section):
 
     model: str | None = None
     fmu: str | None = None
+    steps: Count = 1
     parameters: Settings = {}
     inputs: Settings = {}
 
@@ -120,6 +128,7 @@ class Component(Section):
 
     model: str | None = None
     fmu: str | None = None
+    steps: Count = 1
     parameters: Settings = {}
     inputs: Settings = {}
 
@@ -204,6 +213,7 @@ SECTIONS: dict[str, type[Section]] = {
 UNITS = {
     "simulation.stop_time": "s",
     "simulation.macro_step": "s",
+    "simulation.timeout": "s",
     "landing.position": "m",
     "landing.height": "m",
     "landing.velocity": "m/s",

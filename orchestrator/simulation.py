@@ -12,6 +12,7 @@ import numpy as np
 from orchestrator.fmu import TIMEOUT, FmuError, Group, nearest
 from orchestrator.graph import Graph
 from orchestrator.masters.base import Master, StepReport
+from orchestrator.sub_steps import check_steps
 from orchestrator.work import Work
 
 DIVIDES = 1e-9  # how far (stop - start)/H may be from a whole number
@@ -141,9 +142,10 @@ def simulate(
     Raises
     ------
     ValueError
-        if `H` does not divide the time, or a signal does not exist
+        if `H` does not divide the time, does not suit an FMU's internal step, or a signal does not exist
     """
     n = _steps(start, stop, H)
+    check_steps(graph.components, H)  # type: ignore[arg-type]
     recorder = Recorder(graph, record)
     time, values = start + H * np.arange(n + 1), np.full((n + 1, len(recorder.signals)), np.nan)
     log = Log(master.NAME, H, recorder.signals, time, values)
@@ -194,6 +196,7 @@ class _Run:
         except BaseException as error:  # goes on in the caller's thread
             self.failure = error
         finally:
+            self.master.finish()
             if self.work.names and self.work in self.graph.observers:
                 self.graph.observers.remove(self.work)
 
@@ -215,6 +218,8 @@ class _Run:
             if self.abandoned:
                 return
             report = step(t, H)
+            if self.abandoned:  # it came back after all
+                return
             self.recorder.read(log.values[i + 1])
             log.steps.append(report)
             if book:
@@ -227,6 +232,12 @@ class _Run:
                 log.wall_first, clock = perf_counter() - clock, perf_counter()
                 self._first = {name: (fmu.wall, fmu.solves) for name, fmu in self.graph.components.items()}
             log.wall = perf_counter() - clock
+
+    def abandon(self) -> None:
+        """Leave the run's thread to itself, and all FMUs to it: the call it waits for may return."""
+        self.abandoned = True
+        for fmu in self.graph.components.values():  # type: ignore[union-attr]
+            fmu.abandoned = True
 
     def finish(self) -> None:
         """Cut the log to what was reached; raise what was no failure of an FMU."""
@@ -253,19 +264,20 @@ def _watched(run: _Run, start: float, stop: float, timeout: float) -> None:
     """Run in a thread; give up when one call of an FMU lasts longer than `timeout` (s)."""
     thread = threading.Thread(target=run, args=(start, stop), daemon=True)
     thread.start()
+    fmus = run.graph.components.values()  # type: ignore[union-attr]
     try:
         while thread.is_alive():
             thread.join(min(timeout / 4, 0.25))
-            hung = [
-                f for f in run.graph.components.values() if f.busy_since and perf_counter() - f.busy_since > timeout
-            ]
+            given = perf_counter() - timeout
+            hung = [fmu for fmu in fmus if 0.0 < fmu.busy_since < given]
             if hung and thread.is_alive():
-                run.abandoned = True
-                fmu = hung[0]
-                run.log.error = FmuError(
-                    fmu.name, fmu.time, TIMEOUT, f"no answer within {timeout:g} s; raise the time-out?"
-                )
+                message = f"no answer within {timeout:g} s; raise the time-out?"
+                run.log.error = FmuError(hung[0].name, hung[0].time, TIMEOUT, message)
+                run.abandon()
                 return
     except BaseException:
         run.abandoned = True
+        thread.join(timeout)
+        if thread.is_alive():
+            run.abandon()
         raise

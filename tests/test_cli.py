@@ -6,6 +6,7 @@ import shutil
 import subprocess
 import sys
 from pathlib import Path
+from time import monotonic
 
 import numpy as np
 import pytest
@@ -15,6 +16,7 @@ from fmus.robot.module import robot_table
 from orchestrator import vocabulary
 from orchestrator.contract import check_variables, is_met
 from orchestrator.results import read_fields, read_table
+from tests.fmus import build
 
 ROOT = Path(__file__).resolve().parents[1]
 OSCILLATOR = str(ROOT / "scenarios" / "oscillator.toml")
@@ -47,7 +49,7 @@ def exact_oscillator(t: np.ndarray) -> np.ndarray:
 @pytest.fixture(scope="module")
 def oscillator_run(tmp_path_factory) -> tuple[subprocess.CompletedProcess[str], Path]:
     out = tmp_path_factory.mktemp("runs") / "oscillator"
-    return orchestrate("run", OSCILLATOR, "--out", out, "--stop", 2), out
+    return orchestrate("run", OSCILLATOR, "--out", out, "--stop", 2, "--timeout", 60), out
 
 
 @pytest.fixture(scope="module")
@@ -257,3 +259,51 @@ def test_units_and_causalities_are_part_of_the_contract():
     assert "deg" in broken["output roll"]
     assert "input" in broken["output pitch"]
     assert "body.velocity.y" in broken["output body.velocity.{x,y,z}"]
+
+
+def hanging(folder: Path) -> Path:
+    """A scenario of two FMUs, one of which sleeps for a minute at 0.1 s."""
+    path = folder / "hanging.toml"
+    path.write_text(
+        f"""title = "An FMU that hangs"
+[simulation]
+stop_time = 0.3
+macro_step = 0.05
+tolerances = {{ "b.x" = 1e-2 }}
+[components.a]
+fmu = "{build("odd")}"
+inputs.u = 1.0
+[components.b]
+fmu = "{build("odd")}"
+parameters = {{ fault = 3, fault_time = 0.1 }}
+""",
+        encoding="utf-8",
+    )
+    return path
+
+
+def test_an_fmu_that_hangs_ends_the_run(tmp_path: Path):
+    """x = t for u = 1: what was reached before 0.1 s is kept, and the process does not wait for the FMU."""
+    out, clock = tmp_path / "out", monotonic()
+    done = orchestrate(
+        "run", hanging(tmp_path), "--out", out, "--master", "gauss_seidel", "--set", "simulation.timeout=1.0"
+    )
+    assert done.returncode == 3 and monotonic() - clock < 40.0, done.stderr
+    assert "b, t = 0.1 s: no answer within 1 s" in done.stderr and f"results in {out}" in done.stdout
+    table = read_table(out / "results.csv")
+    assert table["time"] == pytest.approx([0.0, 0.05, 0.1]) and table["a.x"] == pytest.approx(table["time"])
+    content = manifest(out)
+    assert content["complete"] is False and "no answer" in content["error"]
+
+
+def test_an_fmu_that_hangs_ends_a_comparison(tmp_path: Path):
+    """No reference can be made either; the runs that were made are kept."""
+    out, clock = tmp_path / "out", monotonic()
+    masters = ["--masters", "jacobi,gauss_seidel", "--timeout", 1]
+    done = orchestrate("compare", hanging(tmp_path), "--out", out, *masters)
+    assert done.returncode == 3 and monotonic() - clock < 50.0, done.stderr
+    assert done.stderr.count("no answer within 1 s") == 3 and f"results so far in {out}" in done.stdout
+    for master in ("jacobi", "gauss_seidel"):
+        table = read_table(next(out.glob(f"{master}*")) / "results.csv")
+        assert table["time"] == pytest.approx([0.0, 0.05, 0.1])
+    assert manifest(out)["complete"] is False

@@ -12,6 +12,7 @@ import numpy as np
 
 from orchestrator.fmu import suffixed
 from orchestrator.graph import Graph, GraphError, Node
+from orchestrator.masters.parallel import Crew
 
 
 @dataclass(slots=True)
@@ -48,14 +49,16 @@ class Master:
     NAME : key in `MASTERS`
     TITLE : one line
     IMPLICIT : True if steps are repeated, so that every FMU needs rollback
+    crew : makes the rounds over the components, in threads where it pays
     """
 
     NAME: ClassVar[str] = ""
     TITLE: ClassVar[str] = ""
     IMPLICIT: ClassVar[bool] = False
 
-    def __init__(self, graph: Graph):
+    def __init__(self, graph: Graph, *, parallel: str = "never", sequential: bool = True):
         self.graph = graph
+        self.crew = Crew(graph, parallel, sequential=sequential)
 
     def start(self, t: float) -> None:
         """Prepare for the first step, after `graph.initialize`."""
@@ -63,6 +66,10 @@ class Master:
     def step(self, t: float, H: float) -> StepReport:
         """Advance all components from `t` to `t + H`."""
         raise NotImplementedError
+
+    def finish(self) -> None:
+        """The run has ended, well or not: end its threads."""
+        self.crew.close()
 
 
 class History:

@@ -4,7 +4,7 @@ from __future__ import annotations
 
 from typing import ClassVar
 
-from orchestrator.graph import Graph
+from orchestrator.graph import Graph, Node
 from orchestrator.masters.base import Between, History, Loads, Master, StepReport, step_node
 from orchestrator.masters.jacobi import extrapolate
 
@@ -24,13 +24,14 @@ class GaussSeidel(Master):
     Parameters
     ----------
     extrapolation : degree k, 0, 1 or 2
+    parallel : components that need nothing of one another in threads: ``auto`` (where it pays), ``always`` or ``never``
     """
 
     NAME: ClassVar[str] = "gauss_seidel"
     TITLE: ClassVar[str] = "explicit, one component after the other, inputs extrapolated"
 
-    def __init__(self, graph: Graph, *, extrapolation: int = 0):
-        super().__init__(graph)
+    def __init__(self, graph: Graph, *, extrapolation: int = 0, parallel: str = "auto"):
+        super().__init__(graph, parallel=parallel)
         self.history = History(extrapolation)
         self.loads = Loads(graph)
         self.between = Between(graph, self.loads, torn=False)
@@ -48,10 +49,13 @@ class GaussSeidel(Master):
             self.between.begin()
             extrapolate(graph, self.loads, self.history, t, H)
         between = self.between if self.history.order else None
-        for node in graph.nodes:
+
+        def step(node: Node) -> None:
             if node.forward.size:
                 node.receive(graph.y)
             step_node(between, node, t, H)
+
+        self.crew.round(step)
         graph.refresh()
         if graph.observers:
             graph.accepted(t, H)

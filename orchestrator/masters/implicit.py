@@ -14,7 +14,7 @@ from typing import Any, ClassVar
 import numpy as np
 
 from orchestrator.fmu import ERROR, FmuError, Group, Port, State
-from orchestrator.graph import Graph
+from orchestrator.graph import Graph, GraphError, Node
 from orchestrator.masters.base import Between, Loads, Master, StepReport, require_rollback, step_node
 from orchestrator.masters.predictor import Predictor
 from orchestrator.masters.scale import Scale
@@ -61,6 +61,7 @@ class Implicit(Master):
     max_depth : the macro step is halved at most so often
     predictor : order of the prediction of the unknowns, or -1: the one that did best lately
     local_tolerance : if positive, sub-steps are made as short as this local error asks for (see `StepControl`)
+    parallel : components that need nothing of one another in threads: ``auto`` (where it pays), ``always`` or ``never``
     """
 
     IMPLICIT: ClassVar[bool] = True
@@ -77,8 +78,9 @@ class Implicit(Master):
         max_depth: int = 6,
         predictor: int = -1,
         local_tolerance: float = 0.0,
+        parallel: str = "auto",
     ):
-        super().__init__(graph)
+        super().__init__(graph, parallel=parallel)
         require_rollback(graph, self.NAME)
         self.accelerator = accelerator
         self.tolerance, self.max_iterations, self.max_depth = tolerance, max_iterations, max_depth
@@ -87,6 +89,8 @@ class Implicit(Master):
         self.predictor = Predictor(predictor)
         self.scale = Scale(graph, self.loads, absolute, lever)
         self.places = graph.torn
+        if local_tolerance > 0.0:
+            self._require_variable_steps()
         self.control = StepControl(self, local_tolerance, absolute, max_depth) if local_tolerance > 0.0 else None
 
     def start(self, t: float) -> None:
@@ -133,6 +137,7 @@ class Implicit(Master):
     def advance(self, t: float, H: float, depth: int, report: StepReport) -> None:
         """Advance by `H`, by halves if the iteration does not converge."""
         self.graph.exchange_discrete()
+        self.failure = None
         states = self.graph.save()
         try:
             last = depth == self.max_depth
@@ -143,6 +148,7 @@ class Implicit(Master):
                 report.residual = max(report.residual, residual)
                 self._accept(t, H)
                 return
+            self._require_halves(t, H, depth)
             self.graph.restore(states)
             self.graph.u[:] = start_values
         finally:
@@ -150,6 +156,30 @@ class Implicit(Master):
         report.subdivisions += 1
         self.advance(t, H / 2, depth + 1, report)
         self.advance(t + H / 2, H / 2, depth + 1, report)
+
+    def _require_variable_steps(self) -> None:
+        """Raise `GraphError` if steps cannot be adaptive."""
+        fixed = [
+            n.name for n in self.graph.nodes if not n.fmu.capabilities.variable_step or n.fmu.capabilities.internal_step
+        ]
+        if fixed:
+            raise GraphError(
+                f"master {self.NAME}: local_tolerance varies the step, which {', '.join(fixed)} cannot "
+                "(canHandleVariableCommunicationStepSize is false, or fixedInternalStepSize is given); leave it out"
+            )
+
+    def _require_halves(self, t: float, H: float, depth: int) -> None:
+        """Raise `FmuError` if a component cannot be stepped by half of `H`, the macro step halved `depth` times."""
+        for node in self.graph.nodes:
+            if not node.fmu.allows(H / 2, H * 2**depth):
+                cause = self.failure.message if self.failure is not None else "it does not converge"
+                raise FmuError(
+                    node.name,
+                    t,
+                    ERROR,
+                    f"the step of {H:.6g} s would have to be halved ({cause}), but {node.name} cannot vary its step; "
+                    "choose a smaller macro step, or max_depth = 0 to go on with the best iterate",
+                )
 
     def snapshot(self) -> tuple[Any, ...]:
         """Return all that a step changes, the states of the components first (to be released)."""
@@ -243,9 +273,12 @@ class Implicit(Master):
     def _evaluate(self, t: float, H: float, x: np.ndarray) -> None:
         graph = self.graph
         graph.u[self.places] = x
-        for node in graph.nodes:
+
+        def step(node: Node) -> None:
             node.receive(graph.y)
             step_node(self.between, node, t, H)
+
+        self.crew.round(step)
 
 
 def _is_real_output(port: Port) -> bool:

@@ -9,8 +9,9 @@ import numpy as np
 
 from orchestrator.fmu import FmuError, State
 from orchestrator.graph import Graph, GraphError, Node
-from orchestrator.masters.base import step_node
+from orchestrator.masters.base import Between, step_node
 from orchestrator.masters.implicit import Implicit
+from orchestrator.masters.jacobian import OwnDerivatives
 from orchestrator.masters.least_squares import LeastSquares
 
 WORST = 1e-2  # contraction of the outer iteration that the exactness of the inner one reckons with at most
@@ -25,9 +26,9 @@ class InterfaceJacobian(Implicit):
     y(x_k) + J (x - x_k). The rest (the contacts: stiff, nonlinear, cheap) are not approximated. Each outer
     iteration steps the modelled components once and then solves x = S(y(x_k) + J (x - x_k)) for x, rolling
     back and stepping the rest alone, by a quasi-Newton iteration whose columns are reused. J comes from
-    differences with rollback, once for each length of step, and is corrected after every outer iteration
-    (Broyden's update, which meets the last difference); it is made anew only when convergence slows. FMI
-    directional derivatives are of no use for it: they hold at an instant, not over a step.
+    the FMU's directional derivatives where they foretell a step (`OwnDerivatives`), else from differences with
+    rollback, once for each length of step, and is corrected after every outer iteration (Broyden's update,
+    which meets the last difference); it is made anew only when convergence slows.
 
     Order and stability: those of the exchange. When: the default for contact. Cost: about two steps of the
     modelled components a macro step. Reference: Sicklinger et al., Int. J. Numer. Methods Eng. 98 (2014)
@@ -68,7 +69,7 @@ class InterfaceJacobian(Implicit):
         super().__init__(graph, accelerator, max_iterations=max_iterations, **options)
         self.difference, self.slow = difference, slow
         self.inner_tolerance, self.inner_iterations = inner_tolerance, inner_iterations
-        self.models = [Model(graph, node) for node in graph.nodes if not node.forward.size and node.torn]
+        self.models = [Model(graph, node, self.between) for node in graph.nodes if not node.forward.size and node.torn]
         modelled = {model.node.name for model in self.models}
         self.rest = [(i, node) for i, node in enumerate(graph.nodes) if node.name not in modelled]
         if not self.models or not self.rest:
@@ -92,16 +93,19 @@ class InterfaceJacobian(Implicit):
         self.outer, self.last = 0, np.inf
 
     def _differentiate(self, model: Model, t: float, H: float, x: np.ndarray, states: list[State]) -> None:
-        """Make the Jacobian of one component by differences, and leave the component where it was."""
+        """Make the Jacobian of one component anew, and leave the component where it was."""
         node, state = model.node, states[self.graph.nodes.index(model.node)]
         values = x[model.unknowns]
-        base = self._response(node, state, t, H, values)
-        jacobian = np.empty((base.size, values.size))
         steps = self.difference * np.maximum(np.abs(values), 1.0)
-        for j, step in enumerate(steps):
-            shifted = values.copy()
-            shifted[j] += step
-            jacobian[:, j] = (self._response(node, state, t, H, shifted) - base) / step
+
+        def respond(change: np.ndarray) -> np.ndarray:
+            return self._response(node, state, t, H, values + change)
+
+        base = respond(np.zeros_like(values))
+        # wrong by this much, J shrinks the error to `tolerance` within the `slow` iterations that it is given
+        jacobian = model.derivatives.jacobian(H, steps, respond, self.tolerance ** (1.0 / self.slow))
+        if jacobian is None:
+            jacobian = np.stack([(respond(e) - base) for e in np.diag(steps)], axis=1) / steps
         node.fmu.restore(state)
         model.jacobians[H] = jacobian
 
@@ -166,12 +170,14 @@ class Model:
     Attributes
     ----------
     unknowns : (m,) places of the component's inputs among the unknowns
+    derivatives : what the FMU says of its Jacobian
     jacobians : length of step → (n_outputs, m)
     last : unknowns (m,) and outputs (n_outputs,) of the last step made
     """
 
-    def __init__(self, graph: Graph, node: Node):
+    def __init__(self, graph: Graph, node: Node, between: Between):
         self.node = node
+        self.derivatives = OwnDerivatives(graph, between, node)
         first = int(np.searchsorted(graph.torn, node.first))
         self.unknowns = slice(first, first + node.torn)
         self.jacobians: dict[float, np.ndarray] = {}

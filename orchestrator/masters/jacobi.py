@@ -4,7 +4,7 @@ from __future__ import annotations
 
 from typing import ClassVar
 
-from orchestrator.graph import Graph
+from orchestrator.graph import Graph, Node
 from orchestrator.masters.base import History, Loads, Master, StepReport
 
 
@@ -23,13 +23,14 @@ class Jacobi(Master):
     Parameters
     ----------
     extrapolation : degree k, 0, 1 or 2
+    parallel : components in threads: ``auto`` (where it pays), ``always`` or ``never``
     """
 
     NAME: ClassVar[str] = "jacobi"
     TITLE: ClassVar[str] = "explicit, all components at once, inputs extrapolated"
 
-    def __init__(self, graph: Graph, *, extrapolation: int = 0):
-        super().__init__(graph)
+    def __init__(self, graph: Graph, *, extrapolation: int = 0, parallel: str = "auto"):
+        super().__init__(graph, parallel=parallel, sequential=False)
         self.history = History(extrapolation)
         self.loads = Loads(graph)
 
@@ -52,12 +53,15 @@ class Jacobi(Master):
     def _step_all(self, t: float, H: float) -> None:
         """Step with the inputs that are in the graph, then move the outputs."""
         graph = self.graph
-        for node in graph.nodes:
+
+        def step(node: Node) -> None:
             if node.inputs.names:
                 node.inputs.set()
             if node.rates.names:
                 node.rates.set()
             node.fmu.step(t, H)
+
+        self.crew.round(step)
         graph.acted[:] = graph.u
         graph.refresh()
         if graph.observers:

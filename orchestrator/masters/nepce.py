@@ -27,13 +27,14 @@ class Nepce(Jacobi):
     ----------
     extrapolation : degree of b, 0, 1 or 2
     alpha : share of the error that is made good
+    parallel : see `Jacobi`
     """
 
     NAME: ClassVar[str] = "nepce"
     TITLE: ClassVar[str] = "explicit, all components at once, coupling error of the last step compensated"
 
-    def __init__(self, graph: Graph, *, extrapolation: int = 0, alpha: float = 1.0):
-        super().__init__(graph, extrapolation=extrapolation)
+    def __init__(self, graph: Graph, *, extrapolation: int = 0, alpha: float = 1.0, parallel: str = "auto"):
+        super().__init__(graph, extrapolation=extrapolation, parallel=parallel)
         self.alpha = alpha
 
     def start(self, t: float) -> None:

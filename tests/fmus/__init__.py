@@ -19,6 +19,7 @@ from scipy.linalg import expm
 
 from orchestrator.fmu import Fmu
 from orchestrator.graph import Connection, Graph
+from orchestrator.sub_steps import instance
 
 SCRIPTS = Path(__file__).resolve().parent
 OPTIONS = {"canGetAndSetFMUstate": True, "canSerializeFMUstate": True, "needsExecutionTool": False}
@@ -52,11 +53,11 @@ def compiler() -> str | None:
 
 @cache
 def compiled(name: str) -> Path:
-    """Compile a test FMU in C, ``lag2`` (FMI 2.0) or ``lag3`` (FMI 3.0), on Linux; return it."""
+    """Compile a test FMU in C, ``lag2``, ``field2`` … (FMI 2.0) or ``lag3``, ``field3`` (FMI 3.0), on Linux; return it."""
     library, path = _folder() / f"{name}.so", _folder() / f"{name}.fmu"
     text = (SCRIPTS / f"{name}.c").read_text(encoding="utf-8")
     prefix, interfaces = ("fmi2", [FMU2Slave, FMU2Model])
-    if name == "lag3":
+    if name.endswith("3"):
         prefix, interfaces = "fmi3", [FMU3Slave, FMU3Model, FMU3ScheduledExecution]
     known = {n for interface in interfaces for n in dir(interface) if n.startswith(prefix)}
     # the standard wants every function there; those that are not used answer with an error
@@ -67,7 +68,8 @@ def compiled(name: str) -> Path:
     )
     source = _folder() / f"{name}.c"
     source.write_text(text, encoding="utf-8")
-    subprocess.run([str(compiler()), "-shared", "-fPIC", "-O1", str(source), "-o", str(library)], check=True)
+    options = ["-shared", "-fPIC", "-O1", f"-I{SCRIPTS}", str(source), "-o", str(library), "-lm"]
+    subprocess.run([str(compiler()), *options], check=True)
     folder = platform if prefix == "fmi2" else platform_tuple
     with zipfile.ZipFile(path, "w") as archive:
         archive.write(SCRIPTS / f"{name}.xml", "modelDescription.xml")
@@ -75,11 +77,11 @@ def compiled(name: str) -> Path:
     return path
 
 
-def fmu(kind: str, name: str, *, rollback: bool = True, **parameters: float | int | str) -> Fmu:
+def fmu(kind: str, name: str, *, rollback: bool = True, steps: int = 1, **parameters: float | int | str) -> Fmu:
     """Return an instance of a test FMU with parameters set."""
-    instance = Fmu(build(kind, rollback=rollback), name)
-    instance.set_parameters(parameters)
-    return instance
+    made = instance(build(kind, rollback=rollback), name, steps)
+    made.set_parameters(parameters)
+    return made
 
 
 MILD = {"stiffness": 100.0, "damping": 1.0, "ground": 1000.0, "start": (0.1, 0.0)}
@@ -95,13 +97,16 @@ def oscillator(
     *,
     waveform: bool = False,
     rollback: bool = True,
+    steps: tuple[int, int] = (1, 1),
 ) -> Graph:
     """Return two masses on springs to ground, coupled by a spring that belongs to the second one
-    (force-displacement)."""
-    a = fmu("link", "a", rollback=rollback, mass=MASS, ground_stiffness=GROUND, initial_position=start[0])
+    (force-displacement), with their sub-steps."""
+    own = {"mass": MASS, "ground_stiffness": GROUND, "initial_position": start[0]}
+    a = fmu("link", "a", rollback=rollback, steps=steps[0], **own)
     b = fmu(
         "wave" if waveform else "link",
         "b",
+        steps=steps[1],
         mass=MASS,
         ground_stiffness=ground,
         ground_damping=GROUND_DAMPING,

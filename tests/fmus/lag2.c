@@ -1,9 +1,12 @@
-/* Test FMU for FMI 2.0: x' = gain u, y = x; exact for held inputs. Compiled by tests and benchmarks where there is a compiler. */
+/* Test FMU for FMI 2.0: x' = gain u, y = x; exact for held inputs. Compiled by tests and benchmarks where there is a compiler.
+ * A step takes `duration` s of sleep, or -`duration` s of work; from `fault_time` on it comes back with status `fault`. */
+#define _POSIX_C_SOURCE 200809L
 #include <stdlib.h>
 #include <string.h>
+#include <time.h>
 
-typedef struct { double u, x, gain; } Lag;
-enum { VR_U = 1, VR_Y = 2, VR_GAIN = 3, VR_START = 4, OK = 0, ERROR = 3 };
+typedef struct { double u, x, gain, duration, fault, fault_time; } Lag;
+enum { VR_U = 1, VR_Y = 2, VR_GAIN = 3, VR_START = 4, VR_DURATION, VR_FAULT, VR_FAULT_TIME, OK = 0, ERROR = 3 };
 
 const char *fmi2GetVersion(void) { return "2.0"; }
 const char *fmi2GetTypesPlatform(void) { return "default"; }
@@ -37,12 +40,29 @@ int fmi2SetReal(void *c, const unsigned vr[], size_t n, const double values[]) {
         if (vr[i] == VR_U) lag->u = values[i];
         else if (vr[i] == VR_GAIN) lag->gain = values[i];
         else if (vr[i] == VR_START) lag->x = values[i];
+        else if (vr[i] == VR_DURATION) lag->duration = values[i];
+        else if (vr[i] == VR_FAULT) lag->fault = values[i];
+        else if (vr[i] == VR_FAULT_TIME) lag->fault_time = values[i];
         else return ERROR;
     }
     return OK;
 }
+static double clock_s(void) {
+    struct timespec now;
+    clock_gettime(CLOCK_MONOTONIC, &now);
+    return now.tv_sec + 1e-9 * now.tv_nsec;
+}
+static void take(double duration) {
+    if (duration > 0) {
+        struct timespec rest = {(time_t)duration, (long)(1e9 * (duration - (time_t)duration))};
+        nanosleep(&rest, NULL);
+    }
+    for (double start = duration < 0 ? clock_s() : 0; duration < 0 && clock_s() - start < -duration;) {}
+}
 int fmi2DoStep(void *c, double t, double h, int no_rollback) {
     Lag *lag = c;
+    if (lag->duration != 0) take(lag->duration);
+    if (lag->fault != 0 && t >= lag->fault_time) return (int)lag->fault;
     lag->x += h * lag->gain * lag->u;
     return OK;
 }

@@ -1,0 +1,130 @@
+"""Components stepped in threads: the same bits, the same errors, less time; threads end with the run."""
+
+from __future__ import annotations
+
+import threading
+from time import perf_counter, sleep
+
+import numpy as np
+import pytest
+
+from orchestrator.fmu import TIMEOUT, Fmu
+from orchestrator.graph import Connection, Graph
+from orchestrator.masters import MASTERS
+from orchestrator.masters.base import Master
+from orchestrator.masters.parallel import processors
+from orchestrator.simulation import Log, simulate
+from tests.fmus import MILD, compiled, compiler, oscillator
+
+pytestmark = pytest.mark.skipif(compiler() is None, reason="no C compiler on this machine")
+NAMES = ("p", "q", "r")
+PARALLEL = [name for name in MASTERS if name != "reduced_interface"]
+
+
+def lags(*, ring: bool = True, **parameters: dict) -> Graph:
+    """Three integrators: in a ring p → q → r → p, or (all independent in a round) without connections to each other."""
+    parts = {name: Fmu(compiled("lag2"), name) for name in NAMES}
+    for k, (name, part) in enumerate(parts.items()):
+        part.set_parameters({"start": 1.0 + k, "gain": -1.0, **parameters.get(name, {})})
+    pairs = [("p.y", "q.u"), ("q.y", "r.u"), ("r.y", "p.u")] if ring else [(f"{n}.y", f"{n}.u") for n in NAMES]
+    return Graph(parts, [Connection(*pair) for pair in pairs])
+
+
+def run(master: str, graph: Graph, parallel: str, steps: int = 20, **options) -> tuple[Log, Master]:
+    made = MASTERS[master](graph, parallel=parallel, **options)  # type: ignore[call-arg]
+    log = simulate(graph, made, 0.0, steps * 0.01, 0.01)
+    graph.close()
+    return log, made
+
+
+@pytest.mark.parametrize("master", PARALLEL)
+def test_bit_identical_to_serial_stepping(master: str):
+    for ring in (True, False):
+        if master == "interface_jacobian" and not ring:
+            continue  # it needs components to iterate over
+        before = threading.active_count()
+        serial, _ = run(master, lags(ring=ring), "never")
+        threaded, _ = run(master, lags(ring=ring), "always")
+        assert serial.error is None and threaded.error is None
+        assert np.array_equal(serial.values, threaded.values)
+        assert serial.solves == threaded.solves
+        assert threading.active_count() == before
+
+
+def test_threads_are_used_and_end_with_the_run():
+    seen = []
+    graph = lags()
+    simulate(
+        graph, MASTERS["jacobi"](graph, parallel="always"), 0.0, 0.05, 0.01,
+        on_step=lambda _: seen.append(threading.active_count()),
+    )  # fmt: skip
+    graph.close()
+    assert seen == [threading.active_count() + 2] * 5  # the caller steps one of the three itself
+
+
+@pytest.mark.skipif(processors() < 2, reason="one processor")
+def test_auto_uses_threads_for_long_steps_alone():
+    """Three steps that sleep for 4 ms: 12 ms one by one, 8 ms by two threads; nothing to win where a step takes 1 µs."""
+    counts, stamps = [], []
+
+    def on_step(_: object) -> None:
+        counts.append(threading.active_count())
+        stamps.append(perf_counter())
+
+    before, long = threading.active_count(), {name: {"duration": 4e-3} for name in NAMES}
+    graph = lags(**long)
+    log = simulate(graph, MASTERS["jacobi"](graph), 0.0, 0.2, 0.01, on_step=on_step)
+    graph.close()
+    assert log.error is None
+    assert counts[0] == before < counts[-1]
+    assert np.array_equal(log.values, run("jacobi", lags(), "never")[0].values)
+    assert np.median(np.diff(stamps)[-10:]) < 11e-3 < 12e-3 <= np.median(np.diff(stamps)[:4])
+    graph = lags()
+    simulate(graph, MASTERS["jacobi"](graph), 0.0, 0.2, 0.01, on_step=on_step)
+    graph.close()
+    assert counts[-1] == before
+
+
+def test_fmus_that_hold_the_interpreter_stay_in_one_thread():
+    before, counts = threading.active_count(), []
+    graph = oscillator(**MILD)
+    master = MASTERS["jacobi"](graph, parallel="always")
+    simulate(graph, master, 0.0, 0.05, 0.01, on_step=lambda _: counts.append(threading.active_count()))
+    graph.close()
+    assert counts == [before] * 5
+
+
+@pytest.mark.parametrize("master", ["jacobi", "gauss_seidel", "iqn_ils"])
+@pytest.mark.parametrize("failing", [("q",), ("q", "r"), ("r", "p")])
+def test_errors_are_those_of_serial_stepping(master: str, failing: tuple[str, ...]):
+    """The first of the order that fails is the one that is named, whoever is done first."""
+    faults = {
+        name: {"fault": 3.0, "fault_time": 0.045, "duration": 1e-3 if name == failing[0] else 0.0} for name in failing
+    }
+    logs = [run(master, lags(ring=False, **faults), parallel)[0] for parallel in ("never", "always")]
+    serial, threaded = logs
+    assert serial.error is not None and threaded.error is not None
+    assert str(threaded.error) == str(serial.error)
+    assert threaded.error.component == sorted(failing)[0] and len(threaded.time) == 6
+    assert np.array_equal(serial.values, threaded.values)
+
+
+def test_time_out_names_the_one_that_hangs():
+    before, graph = threading.active_count(), lags(q={"duration": 0.8})
+    master = MASTERS["jacobi"](graph, parallel="always")
+    log = simulate(graph, master, 0.0, 0.1, 0.01, timeout=0.2)
+    assert log.error is not None
+    assert (log.error.component, log.error.status, len(log.time)) == ("q", TIMEOUT, 1)
+    while threading.active_count() > before:  # the call returns, and all threads that waited for it end
+        sleep(0.05)
+    for part in graph.components.values():
+        assert part.abandoned
+        part.abandoned = False
+    graph.close()
+
+
+def test_choices():
+    graph = lags()
+    with pytest.raises(ValueError, match="parallel 'often': choose auto, always, never"):
+        MASTERS["jacobi"](graph, parallel="often")
+    graph.close()
