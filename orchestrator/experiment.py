@@ -73,6 +73,7 @@ class Coupled:
             "iterations",
             "residual",
             "subdivisions",
+            "rejected",
             "columns",
             "converged",
             "estimate",

@@ -20,7 +20,7 @@ from orchestrator.masters.predictor import Predictor
 from orchestrator.masters.step_control import StepControl
 
 REPLAY = 1e-12  # relative difference of the outcomes of the same step from the same state
-DIVERGED = 1e6  # growth of the residual over its first value that ends an iteration
+DIVERGED = 1e2  # growth of the unknowns, over accepted ones, prediction and its answer, that ends an iteration
 
 
 class Accelerator:
@@ -126,24 +126,31 @@ class Implicit(Master):
 
     def advance(self, t: float, H: float, depth: int, report: StepReport) -> None:
         """Advance by `H`, by halves if the iteration does not converge."""
+        if self.attempt(t, H, report, last=depth == self.max_depth):
+            return
+        report.subdivisions += 1
+        self.advance(t, H / 2, depth + 1, report)
+        self.advance(t + H / 2, H / 2, depth + 1, report)
+
+    def attempt(self, t: float, H: float, report: StepReport, *, last: bool) -> bool:
+        """Make one step; return whether it was made. If it does not converge all is as before, unless it is the `last`
+        resort: then loads are held."""
         self.graph.exchange_discrete()
         states = self.graph.save()
         try:
-            last = depth == self.max_depth
             start_values = self.graph.u.copy()
             converged, residual = self._solve(t, H, states, report, keep_best=last)
             if converged or last:
                 report.converged &= converged
                 report.residual = max(report.residual, residual)
                 self._accept(t, H)
-                return
+                return True
             self.graph.restore(states)
             self.graph.u[:] = start_values
+            report.rejected += 1
+            return False
         finally:
             self.graph.release(states)
-        report.subdivisions += 1
-        self.advance(t, H / 2, depth + 1, report)
-        self.advance(t + H / 2, H / 2, depth + 1, report)
 
     def snapshot(self) -> tuple[Any, ...]:
         """Return all that a step changes, the states of the components first (to be released)."""
@@ -162,19 +169,51 @@ class Implicit(Master):
 
     def _accept(self, t: float, H: float) -> None:
         self.predictor.append(t + H / 2, self.x, self.scale.values)
+        self.scale.accept(self.x)
         if self.graph.observers:
             self.graph.accepted(t, H)
         self.graph.gather()
+
+    def trial(self, t: float, H: float, x: np.ndarray, tolerance: float, report: StepReport) -> bool:
+        """Make one step from the unknowns `x` (n,) on; return whether it converged to `tolerance`.
+
+        For its outputs, in the graph, alone: the caller takes all back. At least one correction is made, since `x` may
+        meet the tolerance by luck.
+        """
+        self.graph.exchange_discrete()
+        states = self.graph.save()
+        try:
+            return self._iterate(t, H, x, states, tolerance, report, least=2)[0]
+        finally:
+            self.graph.release(states)
 
     def _solve(
         self, t: float, H: float, states: list[State], report: StepReport, *, keep_best: bool
     ) -> tuple[bool, float]:
         """Iterate over one step; return whether it converged and the residual of the iterate the components
         are left at."""
+        x = self.predictor.predict(t + H / 2, self.x)
+        converged, residual, x = self._iterate(t, H, x, states, self.tolerance, report)
+        if converged:
+            self.x = x
+        elif keep_best:
+            self._hold(t, H, x, states, report)
+        return converged, residual
+
+    def _iterate(
+        self,
+        t: float,
+        H: float,
+        x: np.ndarray,
+        states: list[State],
+        tolerance: float,
+        report: StepReport,
+        least: int = 1,
+    ) -> tuple[bool, float, np.ndarray]:
+        """Iterate from `x` on; return whether it converged, the smallest residual and the unknowns it belongs to."""
         self.between.begin()
-        x, best = self.predictor.predict(t + H / 2, self.x), (np.inf, self.x)
+        best, limit = (np.inf, x), np.abs(x)
         self._begin(t, H, x, states)
-        first = np.inf
         for k in range(self.max_iterations):
             r = self._residual(t, H, x, states if k else None, report)
             if r is None:
@@ -182,18 +221,16 @@ class Implicit(Master):
             residual = self.scale.norm(r, x + r, H)
             if residual < best[0]:
                 best = (residual, x)
-            if residual <= self.tolerance:
-                self.x = x
+            if residual <= tolerance and k + 1 >= least:
                 self.accelerator.accept()
-                return True, residual
-            first = min(first, residual)
-            if not residual <= DIVERGED * max(first, self.tolerance):
-                break
+                return True, *best
+            if not k:
+                limit = DIVERGED * np.maximum(self.scale.values, np.abs(x))
             x = self._correct(t, H, x, r, states)
+            if not np.all(np.abs(x) <= limit):
+                break
         self.accelerator.reject()
-        if keep_best:
-            self._hold(t, H, best[1], states, report)
-        return False, best[0]
+        return False, *best
 
     def _begin(self, t: float, H: float, x: np.ndarray, states: list[State]) -> None:
         """Prepare for the iteration of a step that starts at the unknowns `x`."""
@@ -257,8 +294,9 @@ def _compare(outputs: Group, t: float, first: np.ndarray, second: np.ndarray) ->
 class Scale:
     """Typical magnitudes of the unknowns, so that N, N.m and N/s can be compared.
 
-    The running maximum over the components x, y, z of a vector; a load's slope is measured by what it changes
-    in the load within half a step.
+    The largest so far over the components x, y, z of a vector, in the present iterate or in an accepted step: what an
+    iteration that diverged has gone through does not count. A load's slope is measured by what it changes in the load
+    within half a step.
     """
 
     def __init__(self, graph: Graph, loads: Loads, absolute: float):
@@ -276,12 +314,17 @@ class Scale:
         self.largest[:] = 0.0
 
     def update(self, x: np.ndarray, H: float) -> np.ndarray:
-        """Take `x` (n,) into account; return the scale of every unknown, (n,)."""
-        np.maximum.at(self.largest, self.vector, np.abs(x))
-        self.values[:] = self.largest[self.vector]
+        """Return the scale of every unknown, (n,), at the iterate `x` (n,)."""
+        largest = self.largest.copy()
+        np.maximum.at(largest, self.vector, np.abs(x))
+        self.values[:] = largest[self.vector]
         self.values += self.absolute
         self.values[self.rate] = self.values[self.load] * (2.0 / H)
         return self.values
+
+    def accept(self, x: np.ndarray) -> None:
+        """Take the unknowns `x` (n,) of an accepted step into account."""
+        np.maximum.at(self.largest, self.vector, np.abs(x))
 
     def norm(self, r: np.ndarray, x: np.ndarray, H: float) -> float:
         """Return the largest relative residual."""
