@@ -76,6 +76,7 @@ class Coupled:
             "iterations",
             "residual",
             "subdivisions",
+            "rejected",
             "columns",
             "converged",
             "estimate",

@@ -102,7 +102,7 @@ def test_sub_steps_grow_again():
     halves = [step.iterations for step in log.steps]
     assert log.time == pytest.approx(np.linspace(0.0, 0.5, 6))
     assert max(halves[1:]) < 2.5 * min(halves[1:])
-    assert sum(step.subdivisions for step in log.steps[1:]) <= 4
+    assert sum(step.rejected for step in log.steps[1:]) <= 4
 
 
 def test_controller_finds_the_length_that_the_error_allows():

@@ -24,7 +24,7 @@ REPLAY = 1e-12  # relative difference of the outcomes of the same step from the 
 ROUND_OFF = 1e-12
 """Relative correction of the unknowns below which they are as exact as the arithmetic allows, whatever tolerance is
 asked for: across a stiff coupling the residual itself is only known to its gain times round-off."""
-DIVERGED = 1e6  # growth of the residual over its first value that ends an iteration
+DIVERGED = 1e2  # growth of the unknowns, over accepted ones, prediction and its answer, that ends an iteration
 
 
 class Accelerator:
@@ -136,26 +136,33 @@ class Implicit(Master):
 
     def advance(self, t: float, H: float, depth: int, report: StepReport) -> None:
         """Advance by `H`, by halves if the iteration does not converge."""
+        if self.attempt(t, H, report, last=depth == self.max_depth):
+            return
+        self._require_halves(t, H, depth)
+        report.subdivisions += 1
+        self.advance(t, H / 2, depth + 1, report)
+        self.advance(t + H / 2, H / 2, depth + 1, report)
+
+    def attempt(self, t: float, H: float, report: StepReport, *, last: bool) -> bool:
+        """Make one step; return whether it was made. If it does not converge all is as before, unless it is the `last`
+        resort: then loads are held."""
         self.graph.exchange_discrete()
         self.failure = None
         states = self.graph.save()
         try:
-            last = depth == self.max_depth
             start_values = self.graph.u.copy()
             converged, residual = self._solve(t, H, states, report, keep_best=last)
             if converged or last:
                 report.converged &= converged
                 report.residual = max(report.residual, residual)
                 self._accept(t, H)
-                return
-            self._require_halves(t, H, depth)
+                return True
             self.graph.restore(states)
             self.graph.u[:] = start_values
+            report.rejected += 1
+            return False
         finally:
             self.graph.release(states)
-        report.subdivisions += 1
-        self.advance(t, H / 2, depth + 1, report)
-        self.advance(t + H / 2, H / 2, depth + 1, report)
 
     def _require_variable_steps(self) -> None:
         """Raise `GraphError` if steps cannot be adaptive."""
@@ -197,21 +204,52 @@ class Implicit(Master):
             observer.restore(saved)
 
     def _accept(self, t: float, H: float) -> None:
-        self.scale.accept(self.x)
         self.predictor.append(t + H / 2, self.x, self.scale.values)
+        self.scale.accept(self.x)
         if self.graph.observers:
             self.graph.accepted(t, H)
         self.graph.gather()
+
+    def trial(self, t: float, H: float, x: np.ndarray, tolerance: float, report: StepReport) -> bool:
+        """Make one step from the unknowns `x` (n,) on; return whether it converged to `tolerance`.
+
+        For its outputs, in the graph, alone: the caller takes all back. At least one correction is made, since `x` may
+        meet the tolerance by luck.
+        """
+        self.graph.exchange_discrete()
+        states = self.graph.save()
+        try:
+            return self._iterate(t, H, x, states, tolerance, report, least=2)[0]
+        finally:
+            self.graph.release(states)
 
     def _solve(
         self, t: float, H: float, states: list[State], report: StepReport, *, keep_best: bool
     ) -> tuple[bool, float]:
         """Iterate over one step; return whether it converged and the residual of the iterate the components
         are left at."""
+        x = self.predictor.predict(t + H / 2, self.x)
+        converged, residual, x = self._iterate(t, H, x, states, self.tolerance, report)
+        if converged:
+            self.x = x
+        elif keep_best:
+            self._hold(t, H, x, states, report)
+        return converged, residual
+
+    def _iterate(
+        self,
+        t: float,
+        H: float,
+        x: np.ndarray,
+        states: list[State],
+        tolerance: float,
+        report: StepReport,
+        least: int = 1,
+    ) -> tuple[bool, float, np.ndarray]:
+        """Iterate from `x` on; return whether it converged, the smallest residual and the unknowns it belongs to."""
         self.between.begin()
-        x, best = self.predictor.predict(t + H / 2, self.x), (np.inf, self.x)
+        best, limit = (np.inf, x), np.abs(x)
         self._begin(t, H, x, states)
-        first = np.inf
         for k in range(self.max_iterations):
             r = self._residual(t, H, x, states if k else None, report)
             if r is None:
@@ -219,24 +257,20 @@ class Implicit(Master):
             residual = self.scale.norm(r, x, H)
             if residual < best[0]:
                 best = (residual, x)
-            if residual <= self.tolerance:
-                return self._converged(x, residual)
-            first = min(first, residual)
-            if not residual <= DIVERGED * max(first, self.tolerance):
-                break
+            if residual <= tolerance and k + 1 >= least:
+                self.accelerator.accept()
+                return True, *best
+            if not k:
+                limit = DIVERGED * np.maximum(self.scale.values, np.abs(x))
             following = self._correct(t, H, x, r, states)
             if np.max(np.abs(following - x) / self.scale.values) <= ROUND_OFF:
-                return self._converged(x, residual)
+                self.accelerator.accept()
+                return True, residual, x
             x = following
+            if not np.all(np.abs(x) <= limit):
+                break
         self.accelerator.reject()
-        if keep_best:
-            self._hold(t, H, best[1], states, report)
-        return False, best[0]
-
-    def _converged(self, x: np.ndarray, residual: float) -> tuple[bool, float]:
-        self.x = x
-        self.accelerator.accept()
-        return True, residual
+        return False, *best
 
     def _begin(self, t: float, H: float, x: np.ndarray, states: list[State]) -> None:
         """Prepare for the iteration of a step that starts at the unknowns `x`."""

@@ -9,7 +9,7 @@ import numpy as np
 
 from orchestrator.fmu import FmuError, State
 from orchestrator.graph import Graph, GraphError, Node
-from orchestrator.masters.base import Between, step_node
+from orchestrator.masters.base import Between, StepReport, step_node
 from orchestrator.masters.implicit import Implicit
 from orchestrator.masters.jacobian import OwnDerivatives
 from orchestrator.masters.least_squares import LeastSquares
@@ -127,20 +127,39 @@ class InterfaceJacobian(Implicit):
         if self.outer == self.slow:
             for model in self.models:
                 self._differentiate(model, t, H, x, states)
-        return self._solve_interface(t, H, x, r, states)
+        return self._solve_interface(t, H, x, r, states)[0]
 
-    def _solve_interface(self, t: float, H: float, x: np.ndarray, r: np.ndarray, states: list[State]) -> np.ndarray:
+    def trial(self, t: float, H: float, x: np.ndarray, tolerance: float, report: StepReport) -> bool:
+        """Make one step from the unknowns `x` (n,) on, for its outputs alone: one solve, the rest from the models."""
+        self.graph.exchange_discrete()
+        states = self.graph.save()
+        try:
+            self.between.begin()
+            self._begin(t, H, x, states)
+            r = self._residual(t, H, x, None, report)
+            if r is None:
+                return False
+            for model in self.models:
+                model.learn(H, x, self.scale.values)
+            return self._solve_interface(t, H, x, r, states)[1]
+        finally:
+            self.graph.release(states)
+
+    def _solve_interface(
+        self, t: float, H: float, x: np.ndarray, r: np.ndarray, states: list[State]
+    ) -> tuple[np.ndarray, bool]:
+        """Return the unknowns that meet the equation with the models, the best that were found, and whether they do."""
         inner, best = self.accelerator, (np.inf, x)
         inner.begin(H, self.scale.values)
         # the models leave about `contraction` of the residual: to solve more exactly than they are is of no use
-        target = self.inner_tolerance * max(self.tolerance, self.contraction * self.last)
+        target = self.inner_tolerance * max(self.tolerance, self.contraction * self.scale.norm(r, x, H))
         for _ in range(self.inner_iterations):
             residual = self.scale.norm(r, x, H)
             if residual < best[0]:
                 best = (residual, x + r)
             if residual <= target:
                 inner.accept()
-                return x
+                return x, True
             x = inner.propose(x, r)
             try:
                 r = self._rest_residual(t, H, x, states)
@@ -149,7 +168,7 @@ class InterfaceJacobian(Implicit):
                     raise
                 break
         inner.reject()
-        return best[1]
+        return best[1], False
 
     def _rest_residual(self, t: float, H: float, x: np.ndarray, states: list[State]) -> np.ndarray:
         """Return S(x) - x with the modelled components replaced by their models."""

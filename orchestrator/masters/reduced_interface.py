@@ -100,6 +100,7 @@ class ReducedInterface(Master):
 
     def _advance(self, t: float, H: float) -> None:
         graph = self.graph
+        self.scale.accept(self.x)
         graph.u[graph.torn] = self.x
         for node in graph.nodes:
             node.receive(graph.y)

@@ -9,7 +9,7 @@ import numpy as np
 
 from orchestrator.fmu import suffixed
 from orchestrator.graph import Graph, Node
-from orchestrator.masters.base import StepReport, vectors
+from orchestrator.masters.base import Loads, StepReport, vectors
 
 if TYPE_CHECKING:
     from orchestrator.masters.implicit import Implicit
@@ -18,6 +18,7 @@ ORDER = 4  # of the `waveform` exchange; a local error of order 5
 SAFETY = 0.5  # the controller aims at this share of the tolerance
 PROPORTIONAL, INTEGRAL = 0.4 / (ORDER + 1), 0.7 / (ORDER + 1)  # Hairer & Wanner 1996, IV.2, eq. (2.43c)
 SHORTEST, LONGEST = 0.2, 5.0  # change of the length from one sub-step to the next
+COARSE = 1.0
 SMALLEST = 1e-4  # an error below this share of what is aimed at says no more
 
 
@@ -28,14 +29,15 @@ INTERVAL = re.compile(r"(_mean|\brotation)(\.[xyz])?$")
 class StepControl:
     """Advances a macro step in sub-steps whose local error is below a tolerance.
 
-    Each sub-step h is made once as a whole and once in two halves; the difference of the motions, times 2^p/(2^p - 1)
-    with p = 4, estimates the local error of the whole, and the halves are kept. Too large an error: all is rolled back
-    and h shortened. Otherwise a PI controller changes the length that is wanted, shorter or longer, by
-    (S tol/e)^a (e before/S tol)^b, with e the error taken from h to that length by its fifth power.
+    Sub-steps are made in pairs, h and h, and then as one of 2h, for the sake of its outputs alone; the difference of the
+    motions, over 2^p - 1 with p = 4, estimates the local error of the pair. The step of 2h begins at what the pair found,
+    projected on linear loads, and ends at a residual of this tolerance, so that it is cheap. Too large an error: all is
+    rolled back and h shortened. Otherwise a PI controller changes the length that is wanted, shorter or longer, by (S
+    tol/e)^a (e before/S tol)^b, with e the error taken from h to that length by its fifth power.
 
-    Communication with whoever records stays at the fixed macro steps; they are the longest sub-steps too, so a large
-    macro step and a tolerance make the steps adaptive. What is wanted is rounded down to H/2^k, because Jacobians and
-    columns serve one length each.
+    Communication with whoever records stays at the fixed macro steps; they are the longest pairs too, so a large macro
+    step and a tolerance make the steps adaptive. What is wanted is rounded down to H/2^k, because Jacobians and columns
+    serve one length each.
 
     Parameters
     ----------
@@ -46,57 +48,57 @@ class StepControl:
     """
 
     def __init__(self, master: Implicit, tolerance: float, absolute: float, deepest: int):
-        self.master, self.tolerance, self.deepest = master, tolerance, deepest
+        self.master, self.tolerance, self.deepest = master, tolerance, max(deepest, 1)
         self.range = Range(master.graph, absolute)
-        self.level = 0
 
     def start(self) -> None:
         """Begin with whole macro steps."""
-        self.wanted, self.last = np.inf, 1.0  # s, and e / (S tol) of the last sub-step
+        self.wanted, self.last = np.inf, 1.0  # s, and e / (S tol) of the last pair
         self.range.start()
 
     def advance(self, t: float, H: float, report: StepReport) -> None:
         """Advance by the macro step `H`."""
-        done, whole, worst = 0, 2**self.deepest, 0.0
+        done, whole, worst, pairs = 0, 2 ** (self.deepest - 1), 0.0, 0
         while done < whole:
             length = self._length(done, whole, H)
             h = H * length / whole
-            error = self._attempt(t + H * done / whole, h, report, last=length == 1)
-            accepted = error <= self.tolerance or length == 1
-            if not accepted:
-                self.wanted = h * min((error / (SAFETY * self.tolerance)) ** (-1.0 / (ORDER + 1)), 0.5)
-                report.subdivisions += 1
+            error = self._attempt(t + H * done / whole, h / 2, report, last=length == 1)
+            if error > self.tolerance and length > 1:
+                self.wanted = h * self._shortened(error)
+                report.rejected += 1
                 continue
             self.wanted = self._controlled(min(self.wanted, H), h, error)
-            worst = max(worst, error)
-            done += length
+            worst, done, pairs = max(worst, error), done + length, pairs + 1
+        report.subdivisions += 2 * pairs - 1
         report.estimate = worst
 
     def _length(self, done: int, whole: int, H: float) -> int:
-        """Return the longest H/2^k within what is wanted that begins where one of its length would, in H/2^deepest."""
+        """Return the longest H/2^k within what is wanted that begins where one of its length would, in the shortest."""
         length = whole
         while length > 1 and (done % length or H * length / whole > self.wanted * (1.0 + 1e-9)):
             length //= 2
         return length
 
+    def _shortened(self, error: float) -> float:
+        """Return by what factor a pair rejected for its `error` is shortened; by half if it did not converge."""
+        if not np.isfinite(error):
+            return 0.5
+        return float(np.clip((error / (SAFETY * self.tolerance)) ** (-1.0 / (ORDER + 1)), SHORTEST, 0.5))
+
     def _controlled(self, wanted: float, h: float, error: float) -> float:
-        """Return the length wanted next, s, after a sub-step `h` has been accepted with `error`."""
+        """Return the length wanted next, s, after a pair of length `h` has been accepted with `error`."""
         ratio = max(error / (SAFETY * self.tolerance) * (wanted / h) ** (ORDER + 1), SMALLEST)
         factor = ratio**-INTEGRAL * self.last**PROPORTIONAL
         self.last = ratio
         return wanted * float(np.clip(factor, SHORTEST, LONGEST))
 
     def _attempt(self, t: float, h: float, report: StepReport, *, last: bool) -> float:
-        """Make the step whole, then in halves; return the error. If it is too large, all is as before."""
+        """Make two steps of length `h`; return their error. If it is too large, and not the `last` resort, all is as
+        before."""
         master = self.master
         before = master.snapshot()
         try:
-            master.advance(t, h, 0, report)
-            coarse = master.graph.y.copy()
-            master.revert(before)
-            master.advance(t, h / 2, 0, report)
-            master.advance(t + h / 2, h / 2, 0, report)
-            error = self.range.norm(coarse - master.graph.y) * 2**ORDER / (2**ORDER - 1)
+            error = self._pair(t, h, before, report, last=last)
             if error > self.tolerance and not last:
                 master.revert(before)
             else:
@@ -104,6 +106,38 @@ class StepControl:
         finally:
             master.graph.release(before[0])
         return error
+
+    def _pair(self, t: float, h: float, before: tuple, report: StepReport, *, last: bool) -> float:
+        master, unknowns = self.master, []
+        for start in (t, t + h):
+            if not master.attempt(start, h, report, last=last):
+                return np.inf
+            unknowns.append(master.x)
+        after, fine = master.snapshot(), master.graph.y.copy()
+        master.revert(before)
+        try:
+            guess = joined(master.loads, master.places, unknowns[0], unknowns[1], h)
+            converged = master.trial(t, 2 * h, guess, max(master.tolerance, COARSE * self.tolerance), report)
+            coarse = master.graph.y.copy()
+        finally:
+            master.revert(after)
+            master.graph.release(after[0])
+        return self.range.norm(coarse - fine) / (2**ORDER - 1) if converged else np.inf
+
+
+def joined(loads: Loads, places: np.ndarray, first: np.ndarray, second: np.ndarray, h: float) -> np.ndarray:
+    """Return the unknowns (n,) of a step of length 2h from those of its halves: loads are projected on linear functions.
+
+    With f = F1 + F1' (tau + h/2) before the middle and F2 + F2' (tau - h/2) after it, mean and slope of the projection are
+    (F1 + F2)/2 and 3 (F2 - F1)/(4h) + (F1' + F2')/8.
+    """
+    where = {int(place): i for i, place in enumerate(places)}
+    pairs = [(where[a], where[b]) for a, b in loads.fed.tolist() if a in where and b in where]
+    load, rate = np.array(pairs, dtype=np.intp).reshape(-1, 2).T
+    x = second.copy()
+    x[load] = 0.5 * (first[load] + second[load])
+    x[rate] = 0.75 / h * (second[load] - first[load]) + 0.125 * (first[rate] + second[rate])
+    return x
 
 
 class Range:

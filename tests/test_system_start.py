@@ -1,0 +1,60 @@
+"""Landings that begin in contact, just touching and above the line, against the monolithic solution from the start on."""
+
+import numpy as np
+import pytest
+from scipy.optimize import brentq
+
+from orchestrator import landing
+from orchestrator.experiment import opened
+from orchestrator.masters import MASTERS
+from orchestrator.monolithic.solve import integrate, solve
+from orchestrator.simulation import simulate
+from tests.test_system_energy import scenario
+
+STOP, STEP = 0.1, 0.005
+Z, FORCE = "robot.body.position.z", "contact1.normal_force"
+WEIGHT = 38.0 * 9.8
+HEIGHT = "initial.position.z"
+
+
+def problem(one, shift):
+    """The landing with its robot moved up by `shift`, m."""
+    made = landing.problem(one)
+    made.robot.values[made.robot.table.index[HEIGHT]] += shift
+    made.robot.initialize(0.0)
+    return made
+
+
+def coupled(one, shift, master):
+    with opened(one) as graph:
+        robot = graph.components["robot"]
+        robot.set_parameters({HEIGHT: float(robot.read(HEIGHT)) + shift})
+        return simulate(graph, MASTERS[master](graph), 0.0, STOP, STEP, [Z, FORCE])
+
+
+def resting(one):
+    """Return how far the robot stands in the line at rest, m: both walls together, at 50 degrees, carry its weight."""
+
+    def excess(shift):
+        start = integrate(lambda: problem(one, shift), np.array([0.0, 1e-5])).signals
+        return start[FORCE][0] * np.sin(np.radians(50.0)) - WEIGHT
+
+    return brentq(excess, -2e-2, 0.0, rtol=1e-9)
+
+
+@pytest.mark.parametrize("master", ["interface_jacobian", "iqn_ils"])
+@pytest.mark.parametrize("stiffness", [1e8, 1e10])
+@pytest.mark.parametrize("start", ["in contact", "touching", "above"])
+def test_start(start, stiffness, master):
+    """The force at the first instant is the law's at the same pose; after that within the bar of the drops."""
+    one = scenario(stop=STOP, **{"contact__parameters__stiffness": stiffness})
+    shift = resting(one) if start == "in contact" else {"touching": 0.0, "above": 0.01}[start]
+    reference = solve(lambda: problem(one, shift), np.linspace(0.0, STOP, 21))
+    log = coupled(one, shift, master)
+    assert log.error is None and log.unconverged == 0
+    assert log.signal(FORCE)[0] == pytest.approx(reference.signals[FORCE][0], rel=1e-9, abs=1e-9)
+    assert (log.signal(FORCE)[0] > 0.0) == (start == "in contact")
+    assert np.max(log.signal(FORCE)) > 100.0
+    z = reference.signals[Z]
+    assert reference.estimated_error[Z] < 1e-5 * np.ptp(z)
+    assert np.max(np.abs(log.signal(Z) - z)) < 1e-4 * np.ptp(z)
