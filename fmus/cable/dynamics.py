@@ -41,7 +41,7 @@ SLOW = 0.25
 CONVERGED = 1e-12
 """Estimated remaining error of a coordinate, relative to the length of the cable over 200 m (1e-12 m there)."""
 MAX_HALVINGS = 12
-OK, NOT_CONVERGED = 0, 1
+OK, NOT_CONVERGED, NOT_FINITE, OFF_CABLE = range(4)
 
 
 class Work(NamedTuple):
@@ -390,6 +390,18 @@ def port_motion(model, state, s, shape, out):
 
 
 @kernel
+def _refusal(model, ports):
+    """Return OK, or why a step under the loads `ports` cannot be made."""
+    for k in range(N_PORTS):
+        for i in range(13):
+            if not abs(ports[k, i]) < np.inf:
+                return NOT_FINITE
+        if not 0.0 <= ports[k, 0] <= model.s[-1]:
+            return OFF_CABLE
+    return OK
+
+
+@kernel
 def macro_step(model, collocation, alpha, use_alpha, state, h, longest, ports, shown, out, rows, work):
     """Advance `state` by the macro step `h` with inner steps of at most `longest`, and write all outputs.
 
@@ -401,8 +413,15 @@ def macro_step(model, collocation, alpha, use_alpha, state, h, longest, ports, s
     shown : (N_PORTS, 19), receives what `show_ports` writes, then the time means of position and tangent over the macro
         step (over each inner step (x0 + x1)/2 + h/12 (x0' - x1'), the mean of the cubic through its ends) and the work
     out, rows : see `diagnose`
+
+    Returns
+    -------
+    status : OK; NOT_CONVERGED, the state is then undefined; NOT_FINITE or OFF_CABLE, nothing is changed
     """
     n = model.weight.size
+    status = _refusal(model, ports)
+    if status != OK:
+        return status
     sums = state[4 * n :]
     tolerance = CONVERGED * max(1.0, model.s[-1] / 200.0)
     means = work.means

@@ -213,14 +213,6 @@ class Cable:
 
     def step(self, t: float, h: float) -> None:
         """Advance from `t` by the macro step `h`; raises `ModuleError` where Newton's method fails."""
-        if not np.all(np.isfinite(self._ports)):
-            raise ModuleError(f"cable: an input at a port is not a finite number at t = {t:g} s")
-        if np.any(self._ports[:, 0] < 0.0) or np.any(self._ports[:, 0] > self.model.s[-1]):
-            k = int(np.argmax((self._ports[:, 0] < 0.0) | (self._ports[:, 0] > self.model.s[-1])))
-            raise ModuleError(
-                f"cable: port[{k + 1}].s = {self._ports[k, 0]:g} m is off the cable (0 to {self.model.s[-1]:g} m) at "
-                f"t = {t:g} s: the wheel has run past a support; stop the run earlier, or brake the robot"
-            )
         status = dynamics.macro_step(
             self.model,
             self._collocation,
@@ -236,10 +228,23 @@ class Cable:
             self._work,
         )
         if status != dynamics.OK:
-            raise ModuleError(
-                f"cable: Newton's method does not converge at t = {t:g} s, even with inner steps of "
-                f"{min(h, self['integration_step']) / 2**dynamics.MAX_HALVINGS:.3g} s; check the loads at the ports"
+            raise ModuleError(self._failure(status, t, h))
+
+    def _failure(self, status: int, t: float, h: float) -> str:
+        """Return what to say of a step that was not made."""
+        if status == dynamics.NOT_FINITE:
+            return f"cable: an input at a port is not a finite number at t = {t:g} s"
+        if status == dynamics.OFF_CABLE:
+            k = int(np.argmax((self._ports[:, 0] < 0.0) | (self._ports[:, 0] > self.model.s[-1])))
+            return (
+                f"cable: port[{k + 1}].s = {self._ports[k, 0]:g} m is off the cable (0 to {self.model.s[-1]:g} m) at "
+                f"t = {t:g} s: the wheel has run past a support; stop the run earlier, or brake the robot"
             )
+        shortest = min(h, self["integration_step"]) / 2**dynamics.MAX_HALVINGS
+        return (
+            f"cable: Newton's method does not converge at t = {t:g} s, even with inner steps of {shortest:.3g} s; "
+            "check the loads at the ports"
+        )
 
     def refresh(self) -> None:
         """Write the motion of the ports at the present state and arc lengths; all else stays as it is."""
