@@ -155,7 +155,7 @@ def test_steps_and_tolerances_change_together(kind, ratio, stop):
     assert "integration_step" not in other.cable.parameters  # it follows the macro step
     assert other.robot.parameters["integration_step"] == 0.001 * ratio
     changes = {name: change if ratio > 1 else 1 / change for name, change in estimate.TOLERANCES.items()}
-    before = {"tolerance": 3e-6, "local_tolerance": 1e-6}
+    before = {"tolerance": 1e-6, "local_tolerance": 1e-6}
     assert other.master == {name: pytest.approx(before[name] * change) for name, change in changes.items()}
     assert scenario.robot is not None and "integration_step" not in scenario.robot.parameters
 
