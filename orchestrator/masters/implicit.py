@@ -24,6 +24,9 @@ REPLAY = 1e-12  # relative difference of the outcomes of the same step from the 
 ROUND_OFF = 1e-12
 """Relative correction of the unknowns below which they are as exact as the arithmetic allows, whatever tolerance is
 asked for: across a stiff coupling the residual itself is only known to its gain times round-off."""
+NOISE = 1e-3
+"""Largest relative residual that may be round-off. A larger one without a correction is an iteration that is stuck: at an
+iterate so wild that nothing near it is an answer."""
 DIVERGED = 1e2  # growth of the unknowns, over accepted ones, prediction and its answer, that ends an iteration
 
 
@@ -264,6 +267,8 @@ class Implicit(Master):
                 limit = DIVERGED * np.maximum(self.scale.values, np.abs(x))
             following = self._correct(t, H, x, r, states)
             if np.max(np.abs(following - x) / self.scale.values) <= ROUND_OFF:
+                if residual > NOISE:
+                    break
                 self.accelerator.accept()
                 return True, residual, x
             x = following
