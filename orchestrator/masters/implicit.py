@@ -21,9 +21,12 @@ from orchestrator.masters.scale import Scale
 from orchestrator.masters.step_control import StepControl
 
 REPLAY = 1e-12  # relative difference of the outcomes of the same step from the same state
-ROUND_OFF, NOISE = 1e-12, 1e-6
+ROUND_OFF = 1e-12
 """Relative correction of the unknowns below which they are as exact as the arithmetic allows, whatever tolerance is
-asked for: across a stiff coupling the residual itself is only known to its gain times round-off, at most `NOISE`."""
+asked for: across a stiff coupling the residual itself is only known to its gain times round-off."""
+NOISE = 1e-3
+"""Largest relative residual that may be round-off. A larger one without a correction is an iteration that is stuck: at an
+iterate so wild that nothing near it is an answer."""
 DIVERGED = 1e2  # growth of the unknowns, over accepted ones, prediction and its answer, that ends an iteration
 
 
@@ -71,7 +74,7 @@ class Implicit(Master):
         graph: Graph,
         accelerator: Accelerator,
         *,
-        tolerance: float = 1e-6,
+        tolerance: float = 3e-6,
         absolute: float = 1e-3,
         lever: float = 0.01,
         max_iterations: int = 25,
@@ -263,7 +266,7 @@ class Implicit(Master):
             if not k:
                 limit = DIVERGED * np.maximum(self.scale.values, np.abs(x))
             following = self._correct(t, H, x, r, states)
-            if np.max(np.abs(following - x) / self.scale.values) <= ROUND_OFF:  # nothing more will come
+            if np.max(np.abs(following - x) / self.scale.values) <= ROUND_OFF:
                 if residual > NOISE:
                     break
                 self.accelerator.accept()
