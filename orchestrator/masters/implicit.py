@@ -9,6 +9,7 @@ each.
 from __future__ import annotations
 
 import contextlib
+from collections.abc import Callable
 from typing import Any, ClassVar
 
 import numpy as np
@@ -139,7 +140,7 @@ class Implicit(Master):
         if self.attempt(t, H, report, last=depth == self.max_depth):
             return
         self._require_halves(t, H, depth)
-        report.subdivisions += 1
+        report.subdivisions, report.rejected = report.subdivisions + 1, report.rejected + 1
         self.advance(t, H / 2, depth + 1, report)
         self.advance(t + H / 2, H / 2, depth + 1, report)
 
@@ -159,7 +160,6 @@ class Implicit(Master):
                 return True
             self.graph.restore(states)
             self.graph.u[:] = start_values
-            report.rejected += 1
             return False
         finally:
             self.graph.release(states)
@@ -210,11 +210,13 @@ class Implicit(Master):
             self.graph.accepted(t, H)
         self.graph.gather()
 
-    def trial(self, t: float, H: float, x: np.ndarray, tolerance: float, report: StepReport) -> bool:
+    def trial(
+        self, t: float, H: float, x: np.ndarray, tolerance: float, enough: Callable[[], bool], report: StepReport
+    ) -> bool:
         """Make one step from the unknowns `x` (n,) on; return whether it converged to `tolerance`.
 
-        For its outputs, in the graph, alone: the caller takes all back. At least one correction is made, since `x` may
-        meet the tolerance by luck.
+        For its outputs, in the graph, alone: the caller takes all back. At least one correction is made, since the
+        outputs are less accurate than the unknowns. A master that has good outputs earlier stops when they are `enough`.
         """
         self.graph.exchange_discrete()
         states = self.graph.save()
