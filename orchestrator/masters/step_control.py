@@ -12,7 +12,8 @@ from orchestrator.graph import Graph, Node
 from orchestrator.masters.base import StepReport, vectors
 
 if TYPE_CHECKING:
-    from orchestrator.masters.implicit import Implicit, Scale
+    from orchestrator.masters.implicit import Implicit
+    from orchestrator.masters.scale import Scale
 
 ORDER = 4  # of the `waveform` exchange; a local error of order 5
 SAFETY = 0.5  # the controller aims at this share of the tolerance
@@ -138,7 +139,8 @@ def joined(scale: Scale, first: np.ndarray, second: np.ndarray, h: float) -> np.
     With f = F1 + F1' (tau + h/2) before the middle and F2 + F2' (tau - h/2) after it, the projection on linear functions
     has the mean (F1 + F2)/2 and the slope 3 (F2 - F1)/(4h) + (F1' + F2')/8. Others take their last values.
     """
-    load, rate, x = scale.load, scale.rate, second.copy()
+    rate = np.flatnonzero(scale.load != np.arange(scale.load.size))
+    load, x = scale.load[rate], second.copy()
     x[load] = 0.5 * (first[load] + second[load])
     x[rate] = 0.75 / h * (second[load] - first[load]) + 0.125 * (first[rate] + second[rate])
     return x
