@@ -262,10 +262,11 @@ class Implicit(Master):
             if residual <= tolerance and k + 1 >= least:
                 self.accelerator.accept()
                 return True, *best
+            scale = self.scale.values.copy()  # that of x: the correction may try wild unknowns
             if not k:
-                limit = DIVERGED * np.maximum(self.scale.values, np.abs(x))
+                limit = DIVERGED * np.maximum(scale, np.abs(x))
             following = self._correct(t, H, x, r, states)
-            if np.max(np.abs(following - x) / self.scale.values) <= ROUND_OFF:
+            if residual <= tolerance**0.5 and np.max(np.abs(following - x) / scale) <= ROUND_OFF:
                 self.accelerator.accept()
                 return True, residual, x
             x = following
