@@ -9,6 +9,7 @@ each.
 from __future__ import annotations
 
 import contextlib
+from collections.abc import Callable
 from typing import Any, ClassVar
 
 import numpy as np
@@ -142,7 +143,7 @@ class Implicit(Master):
         if self.attempt(t, H, report, last=depth == self.max_depth):
             return
         self._require_halves(t, H, depth)
-        report.subdivisions += 1
+        report.subdivisions, report.rejected = report.subdivisions + 1, report.rejected + 1
         self.advance(t, H / 2, depth + 1, report)
         self.advance(t + H / 2, H / 2, depth + 1, report)
 
@@ -162,7 +163,6 @@ class Implicit(Master):
                 return True
             self.graph.restore(states)
             self.graph.u[:] = start_values
-            report.rejected += 1
             return False
         finally:
             self.graph.release(states)
@@ -213,11 +213,13 @@ class Implicit(Master):
             self.graph.accepted(t, H)
         self.graph.gather()
 
-    def trial(self, t: float, H: float, x: np.ndarray, tolerance: float, report: StepReport) -> bool:
+    def trial(
+        self, t: float, H: float, x: np.ndarray, tolerance: float, enough: Callable[[], bool], report: StepReport
+    ) -> bool:
         """Make one step from the unknowns `x` (n,) on; return whether it converged to `tolerance`.
 
-        For its outputs, in the graph, alone: the caller takes all back. At least one correction is made, since `x` may
-        meet the tolerance by luck.
+        For its outputs, in the graph, alone: the caller takes all back. At least one correction is made, since the
+        outputs are less accurate than the unknowns. A master that has good outputs earlier stops when they are `enough`.
         """
         self.graph.exchange_discrete()
         states = self.graph.save()
@@ -263,10 +265,11 @@ class Implicit(Master):
             if residual <= tolerance and k + 1 >= least:
                 self.accelerator.accept()
                 return True, *best
+            scale = self.scale.values.copy()  # that of x: the correction may try wild unknowns
             if not k:
-                limit = DIVERGED * np.maximum(self.scale.values, np.abs(x))
+                limit = DIVERGED * np.maximum(scale, np.abs(x))
             following = self._correct(t, H, x, r, states)
-            if np.max(np.abs(following - x) / self.scale.values) <= ROUND_OFF:
+            if np.max(np.abs(following - x) / scale) <= ROUND_OFF:  # nothing more will come
                 if residual > NOISE:
                     break
                 self.accelerator.accept()

@@ -3,6 +3,7 @@ are."""
 
 from __future__ import annotations
 
+from collections.abc import Callable
 from typing import Any, ClassVar
 
 import numpy as np
@@ -129,19 +130,27 @@ class InterfaceJacobian(Implicit):
                 self._differentiate(model, t, H, x, states)
         return self._solve_interface(t, H, x, r, states)[0]
 
-    def trial(self, t: float, H: float, x: np.ndarray, tolerance: float, report: StepReport) -> bool:
-        """Make one step from the unknowns `x` (n,) on, for its outputs alone: one solve, the rest from the models."""
+    def trial(
+        self, t: float, H: float, x: np.ndarray, tolerance: float, enough: Callable[[], bool], report: StepReport
+    ) -> bool:
+        """Make one step from the unknowns `x` (n,) on, for its outputs alone: one solve and the rest by the models; a
+        second solve, from which they learn, if that is not `enough`."""
         self.graph.exchange_discrete()
         states = self.graph.save()
+        self.between.begin()
+        self._begin(t, H, x, states)
         try:
-            self.between.begin()
-            self._begin(t, H, x, states)
-            r = self._residual(t, H, x, None, report)
-            if r is None:
-                return False
-            for model in self.models:
-                model.learn(H, x, self.scale.values)
-            return self._solve_interface(t, H, x, r, states)[1]
+            solved = False
+            for again in (False, True):
+                r = self._residual(t, H, x, states if again else None, report)
+                if r is None:
+                    return False
+                for model in self.models:
+                    model.learn(H, x, self.scale.values)
+                x, solved = self._solve_interface(t, H, x, r, states)
+                if solved and enough():
+                    break
+            return solved
         finally:
             self.graph.release(states)
 

@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+from collections.abc import Callable
 from typing import Any, ClassVar
 
 import numpy as np
@@ -50,32 +51,42 @@ class SemiImplicit(Implicit):
     def start(self, t: float) -> None:
         """Prepare for the first step."""
         super().start(t)
-        self.jacobian: np.ndarray | None = None
+        self.jacobians: dict[float, np.ndarray] = {}
         self.age, self.wanted = 0, False
 
-    def advance(self, t: float, H: float, depth: int, report: StepReport) -> None:
+    def attempt(self, t: float, H: float, report: StepReport, *, last: bool) -> bool:
+        """Make one step, whatever residual it leaves."""
         self.graph.exchange_discrete()
+        self.x, residual = self._corrected(t, H, self.predictor.predict(t + H / 2, self.x), report)
+        self.wanted = residual > self.tolerance
+        report.residual = max(report.residual, residual)
+        report.converged &= not self.wanted
+        self._accept(t, H)
+        return True
+
+    def trial(
+        self, t: float, H: float, x: np.ndarray, tolerance: float, enough: Callable[[], bool], report: StepReport
+    ) -> bool:
+        """Make one step from the unknowns `x` (n,) on, for its outputs alone."""
+        self.graph.exchange_discrete()
+        self._corrected(t, H, x, report)
+        return True
+
+    def _corrected(self, t: float, H: float, x: np.ndarray, report: StepReport) -> tuple[np.ndarray, float]:
+        """Step all components with the unknowns `x` (n,) and once more with better ones; return those, and the residual."""
         states = self.graph.save()
         try:
-            self._step(t, H, states, report)
+            self.between.begin()
+            self.scale.update(x, H)
+            r = self._required(t, H, x, None, report)
+            self.age += 1
+            if H not in self.jacobians or (self.wanted and self.age >= self.refresh):
+                self._differentiate(t, H, x, r, states, report)
+            x = x - np.linalg.lstsq(self.jacobians[H], r, rcond=None)[0]
+            r = self._required(t, H, x, states, report)
         finally:
             self.graph.release(states)
-
-    def _step(self, t: float, H: float, states: list[State], report: StepReport) -> None:
-        self.between.begin()
-        x = self.predictor.predict(t + H / 2, self.x)
-        self.scale.update(x, H)
-        r = self._required(t, H, x, None, report)
-        self.age += 1
-        if self.jacobian is None or self.jacobian_step != H or (self.wanted and self.age >= self.refresh):
-            self._differentiate(t, H, x, r, states, report)
-        x = x - np.linalg.lstsq(self.jacobian, r, rcond=None)[0]  # type: ignore[arg-type]
-        r = self._required(t, H, x, states, report)
-        report.residual = self.scale.norm(r, x, H)
-        report.converged = self.wanted = bool(report.residual <= self.tolerance)
-        self.wanted = not report.converged
-        self.x = x
-        self._accept(t, H)
+        return x, self.scale.norm(r, x, H)
 
     def _required(
         self, t: float, H: float, x: np.ndarray, states: list[State] | None, report: StepReport
@@ -95,4 +106,4 @@ class SemiImplicit(Implicit):
             shifted = x.copy()
             shifted[j] += step
             jacobian[:, j] = (self._required(t, H, shifted, states, report) - r) / step
-        self.jacobian, self.jacobian_step, self.age = jacobian, H, 0
+        self.jacobians[H], self.age = jacobian, 0
