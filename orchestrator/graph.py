@@ -326,12 +326,13 @@ class Graph:
 
     def _solve_loops(self, start: float) -> None:
         """Solve for the inputs that are part of an algebraic loop, with derivatives where FMUs give them."""
-        z = self.gathered(self._loop)
+        z, y = self.gathered(self._loop), self.y.copy()
         own = [node for node in self.nodes if node.fmu.capabilities.directional_derivatives]
         # derivatives that are wrong only cost iterations; if too many, differences have the last word
         with contextlib.suppress(FmuError, np.linalg.LinAlgError):
             if own and self._newton(z, own):
                 return
+        self.y[:] = y
         if self._newton(z, []):
             return
         names = ", ".join(self.input_names[i] for i in self._loop[:3])

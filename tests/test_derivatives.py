@@ -5,6 +5,7 @@ The FMU is a field of three states in C (`tests/fmus/field.h`), x' = A x - cubic
 
 from __future__ import annotations
 
+from dataclasses import replace
 from pathlib import Path
 
 import numpy as np
@@ -14,8 +15,10 @@ from orchestrator.derivatives import Partials, states
 from orchestrator.fmu import Fmu, FmuError
 from orchestrator.graph import Connection, Graph
 from orchestrator.masters import MASTERS
+from orchestrator.masters.base import Between, Loads
+from orchestrator.masters.jacobian import OwnDerivatives
 from orchestrator.simulation import Log, simulate
-from tests.fmus import compiled, compiler
+from tests.fmus import MILD, compiled, compiler, oscillator
 from tests.test_fmu import described, started
 
 pytestmark = pytest.mark.skipif(compiler() is None, reason="no C compiler on this machine")
@@ -69,14 +72,28 @@ def test_partials_of_outputs_and_state_derivatives(field: str):
     fmu.close()
 
 
-@pytest.mark.parametrize("mode", [OVER_STEP, AT_INSTANT])
+@pytest.mark.parametrize(("mode", "feed"), [(OVER_STEP, 0.0), (AT_INSTANT, 0.0), (AT_INSTANT, 0.5)])
 @pytest.mark.parametrize("field", FIELDS)
-def test_derivatives_that_foretell_the_step_save_all_differences_but_one(field: str, mode: int, tmp_path: Path):
+def test_derivatives_that_foretell_the_step_save_all_differences_but_one(
+    field: str, mode: int, feed: float, tmp_path: Path
+):
     """Differences take 1 + m steps, derivatives 2: m - 1 saved, once; the results agree to the tolerance."""
-    log, solves = run(coupled(compiled(field), mode=mode))
-    other, more = by_differences(compiled(field), tmp_path)
+    log, solves = run(coupled(compiled(field), mode=mode, feed=feed))
+    other, more = by_differences(compiled(field), tmp_path, feed=feed)
     assert more - solves == M - 1
     assert log.values == pytest.approx(other.values, abs=1e-6)
+
+
+def test_how_inputs_follow_the_unknowns():
+    """A load between both ends with a slope of its own: mean (x0 + x1)/2, slope (x1 - x0)/H; by hand."""
+    graph = oscillator(**MILD)
+    node = graph.nodes[0]
+    node.fmu.capabilities = replace(node.fmu.capabilities, directional_derivatives=True)
+    between = Between(graph, Loads(graph), torn=True)
+    held, ends = OwnDerivatives(graph, between, node)._inputs_of(0.1)
+    graph.close()
+    assert (node.inputs.names, node.rates.names) == (("force",), ("force_rate",))
+    assert held.tolist() == ends.tolist() == [[0.5], [10.0]]
 
 
 @pytest.mark.parametrize("mode", [NONE, WRONG, NOT_A_NUMBER, DISCARD, ERROR])
@@ -157,7 +174,8 @@ def test_wrong_derivatives_do_not_spoil_the_start():
 
 def test_loop_of_an_fmu_with_derivatives_and_one_without(tmp_path: Path):
     graph, evaluations = loop(compiled("field2"), mode=AT_INSTANT)
-    graph.components["b"].capabilities = graph.components["a"].capabilities.__class__(True, False, True, False, False)
+    without = replace(graph.components["b"].capabilities, directional_derivatives=False)
+    graph.components["b"].capabilities = without
     graph.initialize(0.0)
     assert graph.components["b"].read("y[1]") == pytest.approx(14.0 / 3.0, rel=1e-11)
     assert len(evaluations) == 2 + M

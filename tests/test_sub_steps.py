@@ -193,3 +193,16 @@ def test_steps_in_a_scenario():
     assert motions[1] == pytest.approx(motions[0], abs=tolerance * np.ptp(motions[0]))
     with pytest.raises(InputError, match=r"components\.right\.steps: 0 must be greater than or equal to 1"):
         load(OSCILLATOR, ["components.right.steps=0"])
+
+
+@needs_compiler
+def test_validation_finds_a_fixed_internal_step(tmp_path: Path):
+    """Wrong input, before anything is run."""
+    path = described(compiled("lag3"), tmp_path, (VARIES, f'{VARIES} fixedInternalStepSize="0.002"'))
+    scenario = tmp_path / "lag.toml"
+    times = "[simulation]\nstop_time = 0.02\nmacro_step = 0.01\n"
+    scenario.write_text(f'title = "A lag"\n{times}[components.lag]\nfmu = "{path}"\nsteps = 2\n', encoding="utf-8")
+    with pytest.raises(InputError, match="no multiple of its fixed internal step"), experiment.opened(load(scenario)):
+        pass
+    with experiment.opened(load(scenario, ["components.lag.steps=5"])) as graph:
+        assert graph.components["lag"].steps == 5  # type: ignore[attr-defined]

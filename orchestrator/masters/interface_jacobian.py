@@ -104,7 +104,7 @@ class InterfaceJacobian(Implicit):
 
         base = respond(np.zeros_like(values))
         # wrong by this much, J shrinks the error to `tolerance` within the `slow` iterations that it is given
-        jacobian = model.derivatives.jacobian(H, steps, respond, self.tolerance ** (1.0 / self.slow))
+        jacobian = model.derivatives.jacobian(H, steps, respond, self.tolerance ** (1.0 / max(self.slow, 1)))
         if jacobian is None:
             jacobian = np.stack([(respond(e) - base) for e in np.diag(steps)], axis=1) / steps
         node.fmu.restore(state)

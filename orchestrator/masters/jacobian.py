@@ -13,6 +13,7 @@ from orchestrator.masters.base import Between, vectors
 
 MOST_STATES = 200  # beyond that the matrix exponential costs more than the steps it saves
 ROUND_OFF = 1e-12  # relative difference of outputs that says nothing
+TINY = np.finfo(float).tiny  # so that nothing may be foretold where there is nothing
 
 
 class OwnDerivatives:
@@ -27,7 +28,7 @@ class OwnDerivatives:
         J = C Φ B M + D N,   Φ = ∫₀ᴴ exp(A s) ds,   A = ∂f/∂x, B = ∂f/∂u, C = ∂g/∂x, D = ∂g/∂u,
 
     with N the inputs at the end of the step. Which of the two it is, a single step with all unknowns changed at once (up or
-    down by chance) tells. If neither foretells it, the FMU is not asked again.
+    down by chance) tells: the better one is taken. If neither foretells it, the FMU is not asked again.
 
     Parameters
     ----------
@@ -65,9 +66,9 @@ class OwnDerivatives:
         candidates = self._candidates(H)
         change = steps * self.chance.choice([-1.0, 1.0], steps.size)
         seen = respond(change) - base if candidates else base
-        foretold = [J for J in candidates if self._agree(J @ change, seen, base, accuracy)]
-        self.usable = bool(foretold)
-        return foretold[0] if foretold else None
+        misses = [self._miss(J @ change, seen, base, accuracy) for J in candidates]
+        self.usable = min(misses, default=np.inf) <= 1.0
+        return candidates[int(np.argmin(misses))] if self.usable else None
 
     def _candidates(self, H: float) -> list[np.ndarray]:
         """Return what the Jacobian may be, each (n_outputs, m)."""
@@ -96,10 +97,10 @@ class OwnDerivatives:
             ends[:m] = np.eye(m)
         return held, ends
 
-    def _agree(self, foretold: np.ndarray, seen: np.ndarray, base: np.ndarray, accuracy: float) -> bool:
-        """Whether the change of every vector of outputs is foretold, (n_outputs,) each."""
+    def _miss(self, foretold: np.ndarray, seen: np.ndarray, base: np.ndarray, accuracy: float) -> float:
+        """Return how far a change (n_outputs,) was foretold wrongly, by what is allowed; the worst vector of outputs."""
         error, change, size = (self._norms(values) for values in (foretold - seen, seen, base))
-        return bool(np.all(error <= accuracy * change + ROUND_OFF * size))
+        return float(np.max(error / (accuracy * change + ROUND_OFF * size + TINY), initial=0.0))
 
     def _norms(self, values: np.ndarray) -> np.ndarray:
         """Return the largest magnitude in each vector of outputs."""

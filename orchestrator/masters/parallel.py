@@ -7,6 +7,7 @@ interpreter themselves (made with pythonfmu) would only wait for each other; the
 from __future__ import annotations
 
 import os
+from collections import deque
 from collections.abc import Callable, Sequence
 from functools import cache, partial
 from pathlib import Path
@@ -20,6 +21,7 @@ from orchestrator.graph import Graph, Node
 
 CHOICES = ("auto", "always", "never")
 SAMPLE = 5  # rounds that are timed without threads, and then with them, each after one that is not (the first compiles)
+BLOCK = 20  # rounds after which it is looked again whether threads pay
 PATIENCE = 1.0  # s that the end of a thread is waited for
 
 Step = Callable[[Node], None]
@@ -34,7 +36,8 @@ class Crew:
     Parameters
     ----------
     parallel : ``auto``: threads, at most one a processor, if in the first rounds those with threads took less time than
-        those without, hand-over and all; ``always``: one a component (for FMUs that wait for another computer); ``never``
+        those without, hand-over and all, and as long as rounds take less than the steps in them; ``always``: one a
+        component (for FMUs that wait for another computer); ``never``
     sequential : whether a component takes the outputs of earlier ones in the same round
     """
 
@@ -52,12 +55,13 @@ class Crew:
         self._reset()
 
     def _reset(self) -> None:
-        self.undecided = self.most > 1 and any(len(compiled(batch)) > 1 for batch in self.batches)
-        self.times: list[float] = []  # of the rounds so far, s, until it is decided
+        self.watching = self.most > 1 and any(len(compiled(batch)) > 1 for batch in self.batches)
+        self.made, self.serial = 0, 0.0
+        self.times: deque[float] = deque(maxlen=BLOCK)  # of the last rounds, s
 
     def round(self, step: Step) -> None:
         """Call `step` with every component."""
-        if self.undecided:
+        if self.watching:
             self._consider()
         clock = perf_counter()
         if not self.plans:
@@ -66,7 +70,8 @@ class Crew:
         else:
             for batch, plan in zip(self.batches, self.plans, strict=True):
                 self._together(step, batch, plan)
-        if self.undecided:
+        if self.watching:
+            self.made += 1
             self.times.append(perf_counter() - clock)
 
     def close(self) -> None:
@@ -80,6 +85,7 @@ class Crew:
         for worker in self.workers:
             worker.thread.join(PATIENCE)
         self.workers, self.plans, self.done = [], [], SimpleQueue()
+        self.watching = False
 
     def _together(self, step: Step, batch: list[Node], plan: list[list[Node]]) -> None:
         for worker, share in zip(self.workers, plan[1:], strict=False):
@@ -99,29 +105,38 @@ class Crew:
                 self.failures[node.name] = error
 
     def _consider(self) -> None:
-        """Go on in the trial of both ways, or decide."""
-        made = len(self.times)
+        """Try in the first rounds whether threads pay, and look later whether they still do."""
+        made, last = self.made, list(self.times)[-SAMPLE:]
         if made == 1:
             self.before = self._books()
-        elif made == 1 + SAMPLE or self.always:
-            self.plans = [shares(batch, self._step_times(), self.most) for batch in self.batches]
-            self.workers = [_Worker(self.done) for _ in range(max(len(plan) for plan in self.plans) - 1)]
-            self.undecided = not self.always
-        elif made == 2 + 2 * SAMPLE:
-            self.undecided = False
-            if np.median(self.times[-SAMPLE:]) >= np.median(self.times[1 : 1 + SAMPLE]):
+        elif self.always or made == 1 + SAMPLE:
+            self._start()
+            self.serial, self.watching = float(np.median(last or [0.0])), not self.always
+        elif made == 2 + 2 * SAMPLE and np.median(last) >= self.serial:
+            self._dismiss()
+        elif made and made % BLOCK == 0:
+            if made > BLOCK and sum(self.times) >= sum(wall for wall, _ in self._since().values()):
                 self._dismiss()
+            self.before = self._books()
+
+    def _start(self) -> None:
+        self.plans = [shares(batch, self._step_times(), self.most) for batch in self.batches]
+        self.workers = [_Worker(self.done) for _ in range(max(len(plan) for plan in self.plans) - 1)]
 
     def _books(self) -> dict[str, tuple[float, int]]:
         """Return the time spent in each component's steps so far, s, and their number."""
         return {node.name: (node.fmu.wall, node.fmu.solves) for node in self.nodes}
 
+    def _since(self) -> dict[str, tuple[float, int]]:
+        """Return the same, since it was noted in `before`."""
+        now = self._books()
+        return {name: (now[name][0] - wall, now[name][1] - solves) for name, (wall, solves) in self.before.items()}
+
     def _step_times(self) -> dict[str, float]:
-        """Return the mean time of a step of each component since the first round, s; 1 where nothing is known."""
+        """Return the mean time of a step of each component, s; 1 where nothing is known."""
         if self.always:
             return {node.name: 1.0 for node in self.nodes}
-        before, now = self.before, self._books()
-        return {name: (now[name][0] - before[name][0]) / max(now[name][1] - before[name][1], 1) for name in now}
+        return {name: wall / max(solves, 1) for name, (wall, solves) in self._since().items()}
 
 
 class _Worker:
