@@ -75,7 +75,7 @@ class Implicit(Master):
         graph: Graph,
         accelerator: Accelerator,
         *,
-        tolerance: float = 3e-6,
+        tolerance: float = 1e-6,
         absolute: float = 1e-3,
         lever: float = 0.01,
         max_iterations: int = 25,
