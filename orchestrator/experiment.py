@@ -231,9 +231,7 @@ def run(scenario: Scenario, progress: Progress = lambda _: None) -> Coupled:
     with opened(scenario) as graph:
         log = _simulated(scenario, graph, progress)
         fmus = {n: {"file": str(f.path), "sha256": f.sha256} for n, f in graph.components.items()}
-        exchange = next(
-            (str(f.parameters["exchange"]) for f in graph.components.values() if "exchange" in f.parameters), ""
-        )
+        exchange = next((fmu.exchange for fmu in graph.components.values() if fmu.exchange), "")
     if log.error is not None and len(log.time) < 2:
         raise RunError(str(log.error), 0.0)
     fields, table = split_fields(scenario, {"time": log.time, **dict(zip(log.signals, log.values.T, strict=True))})
