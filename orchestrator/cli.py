@@ -99,9 +99,10 @@ def list_() -> None:
 def validate(scenario: ScenarioFile, robot: Robot = None, set_: Set = None) -> None:
     """Parse, load, check connections, units and contract; nothing is run."""
     loaded = _load(scenario, robot, set_)
-    from orchestrator.experiment import opened
+    from orchestrator.experiment import master_of, opened
 
     with opened(loaded) as graph:
+        master_of(loaded, graph)
         print(f"{scenario}: valid; {len(graph.components)} FMUs, {len(list(graph.connections))} connections")
 
 
@@ -223,13 +224,6 @@ def modes(
         print(f"table and picture in {path}")
 
 
-def _mode_cells(group: Any, k: int) -> tuple[str, str]:
-    """Return frequency and damping ratio of mode k (from 0) in words, or nothing."""
-    if k >= group.frequency.size:
-        return "", ""
-    return f"{group.frequency[k]:.6g}", f"{group.damping_ratio[k]:.3g}"
-
-
 @app.command()
 def report(
     directory: Annotated[Path, typer.Argument(metavar="DIR", help="Directory of a finished run.")],
@@ -299,8 +293,10 @@ def _status(runs: list[Coupled], within: bool) -> int:
     """Return the exit status, and say on stderr what failed."""
     from orchestrator.experiment import Interruption
 
-    status = DONE if within else MISSED
+    status = DONE if within and not any(coupled.log.unconverged for coupled in runs) else MISSED
     for coupled in runs:
+        if coupled.log.unconverged:
+            _complain(f"{coupled.label}: {_unconverged(coupled)}")
         for contact in coupled.fallen:
             _complain(f"{contact}: the cable left the groove; the robot has fallen off")
         drift = coupled.energy.warning() if coupled.energy is not None else None
@@ -310,6 +306,15 @@ def _status(runs: list[Coupled], within: bool) -> int:
             _complain(f"{coupled.label}: {coupled.log.error}; the results up to there are kept")
             status = INTERRUPTED if isinstance(coupled.log.error, Interruption) else FAILED
     return status
+
+
+def _unconverged(coupled: Coupled) -> str:
+    """Return how many macro steps did not converge, where, and what helps."""
+    log, steps = coupled.log, [step for step in coupled.log.steps if not step.converged]
+    return (
+        f"{len(steps)} of {len(log.steps)} macro steps did not converge, the first at t = {steps[0].time:g} s (residual "
+        f"{steps[0].residual:.1e}); see iterations.csv, take a smaller macro step or another implicit master"
+    )
 
 
 def _print_run(coupled: Coupled) -> None:

@@ -106,8 +106,8 @@ class Comparison:
 
     @property
     def passed(self) -> bool:
-        """Whether every run meets every tolerance."""
-        return all(check.passed for check in self.checks)
+        """Whether every run meets every tolerance, with every macro step converged."""
+        return all(check.passed for check in self.checks) and not any(run.unconverged_steps for run in self.runs)
 
     @property
     def observed_order(self) -> dict[str, dict[str, float]]:
@@ -188,7 +188,8 @@ def _signal_error(values: np.ndarray, reference: np.ndarray, rows: np.ndarray) -
     difference = np.abs(values - reference[rows])
     largest, scale = float(np.max(difference)), float(np.ptp(reference))
     relative = largest / scale if scale > 0.0 else (0.0 if largest == 0.0 else float("inf"))
-    return SignalError(largest, float(np.sqrt(np.mean(difference**2))), scale, relative)
+    rms = largest * float(np.sqrt(np.mean((difference / largest) ** 2))) if largest > 0.0 else 0.0
+    return SignalError(largest, rms, scale, relative)
 
 
 def _check(run: Run, signal: str, tolerance: float, estimate: float | None) -> Check:

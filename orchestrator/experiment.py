@@ -4,7 +4,7 @@ from __future__ import annotations
 
 import re
 import signal
-from collections.abc import Callable, Iterable, Iterator, Mapping
+from collections.abc import Callable, Container, Iterable, Iterator, Mapping
 from contextlib import contextmanager
 from dataclasses import dataclass, field
 from fractions import Fraction
@@ -26,19 +26,23 @@ from orchestrator.compare import (
     signal_errors,
 )
 from orchestrator.contract import BREAKS, check_variables
-from orchestrator.errors import InputError, OrchestratorError, RunError
+from orchestrator.errors import InputError, OrchestratorError, RunError, nearest
 from orchestrator.estimate import factor, second
 from orchestrator.fmu import Fmu, FmuError
 from orchestrator.graph import Connection, Graph
-from orchestrator.masters import MASTERS, StepReport
+from orchestrator.masters import MASTERS, Master, StepReport
 from orchestrator.report import Record, draw_comparison, draw_run, run_label
 from orchestrator.results import RunDirectory, Table
-from orchestrator.scenario import Scenario
+from orchestrator.scenario import DEFAULT_MASTER, Scenario
 from orchestrator.simulation import Log, simulate
 from orchestrator.sub_steps import check_steps, instance
 
 LEFT_THE_GROOVE = 3
 """Value of a contact's `status` when the cable has left the groove."""
+TIGHTER = 1e-2
+"""The reference's tolerance by that of the runs, so that it does not show what their iterations leave."""
+HOLDING = ("held", "point")
+"""Exchanges in which our modules neither give nor take slopes and means."""
 FIELD_UNITS = {"time": "s", "arc_length": "m", "position": "m", "tension": "N"}
 
 Progress = Callable[[float], None]
@@ -116,7 +120,7 @@ class Coupled:
 
 
 def exchange_of(scenario: Scenario) -> str:
-    """Return the contact's exchange: the scenario's, else what suits the master."""
+    """Return the exchange within a macro step: the scenario's, else what suits the master."""
     implicit = MASTERS[scenario.simulation.master].IMPLICIT
     return scenario.simulation.exchange or ("waveform" if implicit else "point")
 
@@ -156,12 +160,29 @@ def _general_graph(scenario: Scenario) -> Graph:
         for name, section in scenario.components.items():
             file = section.fmu or library.module_fmu(str(section.model))
             components[name] = instance(file, name, section.steps)
-            components[name].set_parameters({**section.parameters, **section.inputs})
-        return Graph(components, [_connection(text) for text in scenario.connections])
+            own = _own_exchange(section.model, exchange_of(scenario))
+            components[name].set_parameters({**own, **section.parameters, **section.inputs})
+        connections = [_connection(text) for text in scenario.connections]
+        holding = {name for name, fmu in components.items() if fmu.exchange in HOLDING}
+        return Graph(components, [c for c in connections if not _serves_an_interval(c, holding)])
     except BaseException:
         for fmu in components.values():
             fmu.close()
         raise
+
+
+def _own_exchange(model: str | None, exchange: str) -> dict[str, str]:
+    """Return the exchange as a parameter of our own `model`: nothing where it has none, its default where it has not
+    this one."""
+    known = vocabulary.of_module(model).get("exchange") if model is not None else None
+    return {"exchange": exchange} if known is not None and exchange in known.choices else {}
+
+
+def _serves_an_interval(connection: Connection, holding: Container[str]) -> bool:
+    """Return whether slopes or means go to or from one of the components that are `holding` values at an instant."""
+    ends = {signal.partition(".")[0] for signal in (connection.source, connection.target)}
+    between = re.search(r"_(rate|mean)(\.[xyz])?$", connection.source)
+    return between is not None and any(name in holding for name in ends)
 
 
 def _connection(text: str) -> Connection:
@@ -210,9 +231,7 @@ def run(scenario: Scenario, progress: Progress = lambda _: None) -> Coupled:
     with opened(scenario) as graph:
         log = _simulated(scenario, graph, progress)
         fmus = {n: {"file": str(f.path), "sha256": f.sha256} for n, f in graph.components.items()}
-        exchange = next(
-            (str(f.parameters["exchange"]) for f in graph.components.values() if "exchange" in f.parameters), ""
-        )
+        exchange = next((fmu.exchange for fmu in graph.components.values() if fmu.exchange), "")
     if log.error is not None and len(log.time) < 2:
         raise RunError(str(log.error), 0.0)
     fields, table = split_fields(scenario, {"time": log.time, **dict(zip(log.signals, log.values.T, strict=True))})
@@ -252,14 +271,28 @@ def _simulated(scenario: Scenario, graph: Graph, progress: Progress) -> Log:
             progress(report.time)
             check(report.time)
 
+        master = master_of(scenario, graph)
         try:
-            master = MASTERS[simulation.master](graph, **scenario.master)
             times = 0.0, simulation.stop_time, simulation.macro_step
             return simulate(graph, master, *times, recorded(graph), on_step, simulation.timeout)
         except (ValueError, TypeError) as error:
             raise InputError(f"{scenario.path}: {error}") from None
         except FmuError as error:
             raise RunError(str(error), error.time) from None
+
+
+def master_of(scenario: Scenario, graph: Graph) -> Master:
+    """Return the scenario's master for `graph`; `InputError` if it cannot couple these FMUs."""
+    known = recorded(graph)
+    missing = [name for name in scenario.simulation.tolerances if name not in known]
+    if missing:
+        raise InputError(
+            f"{scenario.path}: simulation.tolerances.{n}: no such signal{nearest(n, known)}" for n in missing
+        )
+    try:
+        return MASTERS[scenario.simulation.master](graph, **scenario.master)
+    except (ValueError, TypeError) as error:
+        raise InputError(f"{scenario.path}: {error}") from None
 
 
 def recorded(graph: Graph) -> list[str]:
@@ -311,9 +344,20 @@ def _monolithic_reference(scenario: Scenario, times: np.ndarray, progress: Progr
 def _fine_reference(scenario: Scenario, macro_steps: list[float], progress: Progress) -> Reference:
     """Return the same graph at a much smaller macro step; its error is taken from one twice as large."""
     common = common_divisor(macro_steps)
-    fine, coarse = (_completed(scenario.changed(macro_step=common / n), progress) for n in (8, 4))
+    try:
+        fine, coarse = (_completed(_accurate(scenario, common / n), progress) for n in (8, 4))
+    except RunError:  # an FMU cannot go back: the master that was asked for has to do
+        fine, coarse = (_completed(scenario.changed(macro_step=common / n), progress) for n in (8, 4))
     kind = f"coupled, {fine.master}, macro step {fine.log.macro_step:g} s"
     return Reference(kind, fine.table, fine.log.wall, dict(largest_difference(coarse.table, fine.table)))
+
+
+def _accurate(scenario: Scenario, macro_step: float) -> Scenario:
+    """Return the scenario at `macro_step` (s) with an implicit master, its own if it has one, and a tight tolerance."""
+    own = MASTERS[scenario.simulation.master].IMPLICIT
+    name, options = (scenario.simulation.master, dict(scenario.master)) if own else (DEFAULT_MASTER, {})
+    tolerance = options.get("tolerance", vocabulary.masters()[name]["tolerance"])
+    return scenario.changed(options | {"tolerance": TIGHTER * tolerance}, master=name, macro_step=macro_step)
 
 
 def _completed(scenario: Scenario, progress: Progress) -> Coupled:

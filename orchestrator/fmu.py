@@ -8,14 +8,13 @@ from __future__ import annotations
 
 import atexit
 import contextlib
-import difflib
 import hashlib
 import logging
 import os
 import re
 import tempfile
 import zipfile
-from collections.abc import Iterable, Mapping, Sequence
+from collections.abc import Mapping, Sequence
 from ctypes import c_void_p
 from dataclasses import dataclass
 from pathlib import Path
@@ -27,6 +26,7 @@ import fmpy
 import numpy as np
 from fmpy.model_description import ModelDescription, ModelVariable
 
+from orchestrator.errors import nearest
 from orchestrator.fmi import DISCARD, ERROR, FATAL, LABELS, WARNING, Call, Fmi2, Fmi3, finalize_python
 
 logging.getLogger("fmus").addHandler(logging.NullHandler())  # what our FMUs say comes through FMI, like that of others
@@ -105,12 +105,6 @@ class Capabilities:
     internal_step: float | None = None
 
 
-def nearest(name: str, known: Iterable[str]) -> str:
-    """Return ``; did you mean …?`` with the known name nearest to `name`, or nothing."""
-    found = difflib.get_close_matches(name, list(known), n=1, cutoff=0.4)
-    return f"; did you mean {found[0]}?" if found else ""
-
-
 def suffixed(name: str, suffix: str) -> str:
     """Return ``force_rate.x`` for ``force.x`` and ``_rate``: the suffix goes before the axis."""
     stem, axis = re.fullmatch(r"(.*?)(\.[xyz])?", name).groups()  # type: ignore[union-attr]
@@ -181,6 +175,7 @@ class _Run:
         direct = dtype is np.float64 and pick.size == values.size == int(starts[-1])
         self.direct = direct and bool(np.all(pick == self.elements))
         self.buffer = values if self.direct else np.zeros(int(starts[-1]), dtype=dtype)
+        self.partial = len(set(self.elements.tolist())) < int(starts[-1])
         self.get_call: Call = fmu.fmi.accessor("Get", kind, self.vr, self.buffer)
         self.set_call: Call = fmu.fmi.accessor("Set", kind, self.vr, self.buffer)
 
@@ -191,6 +186,8 @@ class _Run:
         return status
 
     def set(self) -> int:
+        if self.partial:  # the other elements of the array stay as they are
+            self.get_call()
         if not self.direct:
             self.buffer[self.elements] = self.values[self.pick]
         return self.set_call()
@@ -301,7 +298,7 @@ class Fmu:
             with contextlib.chdir("."):  # FMPy stays in the library's folder if that cannot be loaded
                 self.fmi = binding(self.description, unzip(self.path, self.sha256), self.name, self._message)
         except Exception as error:
-            hint = f" ({self.log[-1]})" if self.log else ""
+            hint = f" ({_gist(self.log[-1])})" if self.log else ""
             raise ValueError(f"{self.path}: the FMU cannot be loaded: {error}{hint}") from error
         _instances.append(self)
 
@@ -318,7 +315,7 @@ class Fmu:
 
     def failure(self, status: int, what: str, cure: str = "") -> FmuError:
         """Return the error that says `what` happened, with the FMU's own last words and a cure."""
-        said = f"; the FMU says: {self.log[-1]}" if self.log else ""
+        said = f"; the FMU says: {_gist(self.log[-1])}" if self.log else ""
         return FmuError(self.name, self.time, status, what + said + (cure or CURES.get(status, "")))
 
     def port(self, name: str) -> Port:
@@ -340,6 +337,12 @@ class Fmu:
                 raise ValueError(f"{self.name}.{name} is no parameter: its causality is {port.causality}")
             self._set_one(port, value)
         self.parameters |= values
+
+    @property
+    def exchange(self) -> str:
+        """What the FMU assumes of the motion inside a step (`held`, `point`, …), empty if it has no such parameter."""
+        port = self.ports.get("exchange")
+        return "" if port is None else str(self.parameters.get("exchange", port.start or ""))
 
     def twin(self) -> Fmu:
         """Return a second instance with the same parameters, not initialised."""
@@ -369,6 +372,10 @@ class Fmu:
         limits = (0, 1) if port.kind == "boolean" else np.iinfo(self.fmi.TYPES[port.fmi_type][1])
         low, high = limits if isinstance(limits, tuple) else (limits.min, limits.max)
         return number == value == float(number) and low <= number <= high
+
+    def write(self, name: str, value: Value) -> None:
+        """Set one variable, of any type (slow)."""
+        self._set_one(self.port(name), value)
 
     def read(self, name: str) -> Value:
         """Return one variable, of any type (slow)."""
@@ -446,6 +453,12 @@ class Fmu:
             self.fmi.terminate()
         if self.worst < FATAL:
             self.fmi.free()
+
+
+def _gist(message: str) -> str:
+    """Return the line of a message that says what happened: the first, of a traceback the last."""
+    lines = [line for line in message.splitlines() if line.strip()] or [""]
+    return lines[-1] if "Traceback" in lines[0] else lines[0]
 
 
 def _require_possible(fmu: Fmu) -> None:

@@ -18,11 +18,12 @@ from scipy.sparse import csr_array
 from scipy.sparse.csgraph import connected_components
 
 from orchestrator.derivatives import Partials
-from orchestrator.fmu import Fmu, FmuError, Group, Port, State, nearest, suffixed
+from orchestrator.errors import nearest
+from orchestrator.fmu import Fmu, FmuError, Group, Port, State, suffixed
 
 LOOP_ITERATIONS, LOOP_TOLERANCE, DIFFERENCE = 20, 1e-11, 1e-6
 EXPONENTS = ("kg", "m", "s", "A", "K", "mol", "cd", "rad")
-CASTS = {("real", "real"), ("integer", "real"), ("integer", "integer"), ("boolean", "boolean")}
+CASTS = {("real", "real"), ("integer", "real"), ("integer", "integer"), ("boolean", "boolean"), ("string", "string")}
 
 
 class GraphError(ValueError):
@@ -167,10 +168,12 @@ class Graph:
 
     def _allocate(self) -> None:
         rank = {name: i for i, name in enumerate(self.order or ())}
-        continuous = [k for k in self._links if not k.discrete]
+        self.texts = [k for k in self._links if self._kind(k) == "string"]
+        links = [k for k in self._links if k not in self.texts]
+        continuous = [k for k in links if not k.discrete]
         # torn inputs first within each component, so that both kinds are one slice
         continuous.sort(key=lambda k: (rank[k.target[0]], rank[k.source[0]] < rank[k.target[0]]))
-        discrete = sorted((k for k in self._links if k.discrete), key=lambda k: rank[k.target[0]])
+        discrete = sorted((k for k in links if k.discrete), key=lambda k: rank[k.target[0]])
         self.links = continuous
         self._inputs, self._discrete_inputs = [k.target for k in continuous], [k.target for k in discrete]
         self._outputs = sorted(dict.fromkeys(k.source for k in continuous), key=lambda s: rank[s[0]])
@@ -185,6 +188,9 @@ class Graph:
         self.input_names = [".".join(target) for target in self._inputs]
         self.free_rates, self.rate_of = self._free_rates()
         self.r = np.zeros(len(self.free_rates))
+
+    def _kind(self, link: _Link) -> str:
+        return self.components[link.source[0]].ports[link.source[1]].kind
 
     def _free_rates(self) -> tuple[list[tuple[str, str]], np.ndarray]:
         """Return the inputs ``_rate`` of connected loads that nothing feeds, and the places of those loads
@@ -242,6 +248,8 @@ class Graph:
 
     def exchange_discrete(self) -> None:
         """Move the discrete connections (at a communication point)."""
+        for link in self.texts:
+            self.components[link.target[0]].write(link.target[1], self.components[link.source[0]].read(link.source[1]))
         if not self.d.size:
             return
         for node in self.discrete:

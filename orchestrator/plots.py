@@ -6,7 +6,7 @@ Reference and coupled run stand in one figure with their difference beside them.
 from __future__ import annotations
 
 from collections.abc import Iterator, Mapping, Sequence
-from contextlib import contextmanager
+from contextlib import contextmanager, suppress
 from dataclasses import dataclass
 from pathlib import Path
 from typing import Any
@@ -336,12 +336,12 @@ def _telling_instants(run: Table, time: np.ndarray) -> list[int]:
 
 @contextmanager
 def _figure(path: Path, size: tuple[float, float]) -> Iterator[Figure]:
-    """Give a figure in the house style and save it, whole or not at all."""
-    with matplotlib.rc_context(STYLE):
+    """Give a figure in the house style and save it, whole or not at all: not if a run has diverged beyond any axis."""
+    with matplotlib.rc_context(STYLE), np.errstate(over="ignore"):
         figure = plt.figure(figsize=size)
         try:
             yield figure
-            with replacing(path) as temporary:
+            with suppress(OverflowError), replacing(path) as temporary:
                 figure.savefig(temporary)
         finally:
             plt.close(figure)

@@ -49,7 +49,7 @@ class RunDirectory:
     def write_table(self, name: str, table: Mapping[str, np.ndarray]) -> None:
         """Write `table` as CSV in FMPy's own format; every number reads back bit for bit."""
         with replacing(self.path / name) as temporary, open(temporary, "w", encoding="utf-8") as file:
-            file.write(",".join(f'"{column}"' for column in table) + "\n")
+            csv.writer(file, quoting=csv.QUOTE_ALL, lineterminator="\n").writerow(table)
             for row in zip(*(_exact(column) for column in table.values()), strict=True):
                 file.write(",".join(row) + "\n")
 

@@ -193,10 +193,11 @@ class Scenario(Section):
         """Whether this is a landing and not a general graph."""
         return self.landing is not None
 
-    def changed(self, **simulation: Any) -> Scenario:
-        """Return a copy with other simulation settings (macro_step, …), checked again."""
+    def changed(self, options: Settings | None = None, **simulation: Any) -> Scenario:
+        """Return a copy with other simulation settings (macro_step, …) and master `options`, checked again."""
         document = self.model_dump()
         document["simulation"] |= simulation
+        document["master"] = document["master"] if options is None else options
         copy = Scenario.model_validate(document)
         copy._path, copy._provenance = self._path, self._provenance
         return copy
@@ -230,11 +231,14 @@ POSITIVE = {
     "robot": {"mass", "inertia.xx", "inertia.yy", "inertia.zz"},
     "contact": {"stiffness", "exponent", "wheel_radius", "groove_angle", "groove_width", "cable_diameter"}
     | {"max_contact_length"},
+    "master": {"tolerance", "absolute", "max_iterations", "relaxation", "mixing", "difference", "inner_tolerance"}
+    | {"inner_iterations", "slow", "refresh"},
 }
 NON_NEGATIVE = {
     "cable": {"bending_stiffness", "damping_time", "spectral_radius", "gravity"},
     "robot": {"gravity"},
     "contact": {"damping", "friction_coefficient"},
+    "master": {"max_depth", "local_tolerance", "reuse", "depth", "threshold"},
 }
 
 
@@ -256,7 +260,8 @@ def load(
     path : the TOML file
     overrides : ``key=value`` in TOML syntax, ``robot.parameters.mass=12``; they replace what the file says
     robot : name of the catalogue or path of an FMU (relative to the current folder), in the robot's place
-    master : in the master's place, with its own defaults: options and exchange of another do not fit it
+    master : in the master's place, with its own defaults: exchange and options of another do not fit it, but for the
+        tolerance
     """
     path = Path(path)
     document = _named_tables(_read(path))
@@ -352,9 +357,10 @@ def _replace_robot(document: Document, robot: str) -> None:
 
 
 def _replace_master(document: Document, master: str) -> None:
-    simulation = document.setdefault("simulation", {})
+    simulation, options = document.setdefault("simulation", {}), document.get("master", {})
     if simulation.get("master", DEFAULT_MASTER) != master:
-        document.pop("master", None)
+        known = vocabulary.masters().get(master, {})
+        document["master"] = {key: value for key, value in options.items() if key == "tolerance" and key in known}
         simulation.pop("exchange", None)
     simulation["master"] = master
 
@@ -449,7 +455,8 @@ def _component_problems(
             place = f"{path}.{group}.{name}"
             names = [v.name for v in known.values() if v.causality == causality]
             if name not in names:
-                yield Problem(place, f"unknown key{nearest(name, names)}")
+                other = f"is no {causality}; its causality is {known[name].causality}" if name in known else ""
+                yield Problem(place, other or f"unknown key{nearest(name, names)}")
                 continue
             yield from _value_problems(place, known[name], value)
             yield from _unit_problems(place, provenance, known[name].unit)
@@ -507,6 +514,8 @@ def _choice_problems(document: Document) -> Iterator[Problem]:
         elif not _is_like(value, masters[name][key]):
             wanted = type(masters[name][key]).__name__
             yield Problem(f"master.{key}", f"{value!r} is not of type {wanted}")
+        else:
+            yield from _bound_problems(f"master.{key}", "master", key, value)
     robots = vocabulary.robots()
     if isinstance(model, str) and model not in robots:
         yield Problem("robot.model", f"no robot {model!r} in the catalogue{nearest(model, robots)}")

@@ -9,7 +9,8 @@ from time import perf_counter
 
 import numpy as np
 
-from orchestrator.fmu import TIMEOUT, FmuError, Group, nearest
+from orchestrator.errors import nearest
+from orchestrator.fmu import TIMEOUT, FmuError, Group
 from orchestrator.graph import Graph
 from orchestrator.masters.base import Master, StepReport
 from orchestrator.sub_steps import check_steps
@@ -57,7 +58,8 @@ class Log:
     @property
     def power_residual(self) -> dict[str, np.ndarray]:
         """Load → difference of the powers on both sides of the interface in each macro step, (n,) W."""
-        return {name: np.diff(values) / self.macro_step for name, values in self.energy_residual.items()}
+        with np.errstate(over="ignore", invalid="ignore"):  # of a run that has diverged
+            return {name: np.diff(values) / self.macro_step for name, values in self.energy_residual.items()}
 
     @property
     def unconverged(self) -> int:

@@ -54,18 +54,20 @@ def robot_variables(n_wheels: int) -> dict[str, Variable]:
 
 def of_fmu(path: Path) -> dict[str, Variable]:
     """Return the variables of the FMU at `path` by name; raise `InputError` if it is none."""
+    from orchestrator.fmu import element_names
+
     known: dict[str, Variable] = {}
     for v in description(path).modelVariables:
         parameter = v.causality == "parameter" or (v.causality == "local" and v.variability == "tunable")
-        kind = KINDS.get(v.type, "real")
-        known[v.name] = Variable(
-            v.name,
+        kind = KINDS.get(v.type, "integer")
+        fixed = (
             "parameter" if parameter else "input" if v.causality == "input" else "output",
             v.unit or (v.declaredType.unit if v.declaredType else None) or "1",
             _start(v.start, kind),
             v.description or "",
             kind,
         )
+        known |= {name: Variable(name, *fixed) for name in element_names(v)}
     return known
 
 

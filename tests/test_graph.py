@@ -5,10 +5,13 @@ from __future__ import annotations
 import numpy as np
 import pytest
 
+from orchestrator.fmu import Fmu
 from orchestrator.graph import Connection, Graph, GraphError
 from orchestrator.masters import MASTERS
 from orchestrator.simulation import simulate
-from tests.fmus import MILD, fmu, oscillator
+from tests.fmus import MILD, compiled, compiler, fmu, oscillator
+
+needs_compiler = pytest.mark.skipif(compiler() is None, reason="no C compiler on this machine")
 
 REFUSED = [
     ("a.y", "c.u", "no component 'c'"),
@@ -20,6 +23,7 @@ REFUSED = [
     ("a.x", "b.u", "unit m.s is no measure of m"),
     ("a.angle", "b.u", "unit deg is no measure of m"),
     ("a.y", "b.count_in", "Real cannot feed Integer"),
+    ("a.said", "b.u", "String cannot feed Real"),
     ("a.flag", "b.count_in", "Boolean cannot feed Integer"),
 ]
 
@@ -86,6 +90,25 @@ def test_discrete_and_whole_numbers_move_at_communication_points(pair):
     assert pair["b"].read("flag_in") is True
     assert pair["b"].read("held_in") == pytest.approx(0.9 * 1.2, rel=1e-12)
     assert graph.u.size == 2
+
+
+@needs_compiler
+def test_one_element_of_an_array_leaves_the_others_alone():
+    """x' = u[1] + u[2] with u[2] = 3 mm set by hand and u[1] = 2 m connected: 2003 mm/s for 0.1 s."""
+    parts = {"source": fmu("odd", "source", offset=2.0), "lag": Fmu(compiled("lag3"), "lag")}
+    parts["lag"].set_parameters({"u[2]": 3.0})
+    graph = Graph(parts, [Connection("source.y", "lag.u[1]")])
+    log = simulate(graph, MASTERS["jacobi"](graph), 0.0, 0.1, 0.1, ["lag.y[1]"])
+    graph.close()
+    assert log.values[-1, 0] == pytest.approx(200.3, rel=1e-12)
+
+
+def test_text_moves_at_communication_points():
+    parts = {"a": fmu("odd", "a", note="100 % true"), "b": fmu("odd", "b")}
+    graph = Graph(parts, [Connection("a.said", "b.heard")])
+    graph.initialize(0.0)
+    assert parts["b"].read("heard") == "100 % true"
+    graph.close()
 
 
 def test_discrete_inputs_stay_put_in_the_iteration():

@@ -144,9 +144,10 @@ class Loads:
 
 
 def _takes_means(node: Node) -> bool:
-    """Return whether a component has inputs for the time means of others."""
+    """Return whether a component has inputs for the time means of others, and does not hold its inputs all the same."""
     ports = node.fmu.ports
-    return any(port.causality == "input" and suffixed(name, "_mean") in ports for name, port in ports.items())
+    told = any(port.causality == "input" and suffixed(name, "_mean") in ports for name, port in ports.items())
+    return told and node.fmu.exchange != "held"
 
 
 class Between:

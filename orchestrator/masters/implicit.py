@@ -8,20 +8,19 @@ each.
 
 from __future__ import annotations
 
-import contextlib
 from collections.abc import Callable
 from typing import Any, ClassVar
 
 import numpy as np
 
-from orchestrator.fmu import ERROR, FmuError, Group, Port, State
+from orchestrator.fmu import ERROR, FmuError, State
 from orchestrator.graph import Graph, GraphError, Node
 from orchestrator.masters.base import Between, Loads, Master, StepReport, require_rollback, step_node
 from orchestrator.masters.predictor import Predictor
+from orchestrator.masters.replay import check_replay
 from orchestrator.masters.scale import Scale
 from orchestrator.masters.step_control import StepControl
 
-REPLAY = 1e-12  # relative difference of the outcomes of the same step from the same state
 ROUND_OFF = 1e-12
 """Relative correction of the unknowns below which they are as exact as the arithmetic allows, whatever tolerance is
 asked for: across a stiff coupling the residual itself is only known to its gain times round-off."""
@@ -111,7 +110,8 @@ class Implicit(Master):
     def step(self, t: float, H: float) -> StepReport:
         """Advance all components from `t` to `t + H`; never leaves an unconverged step unsaid."""
         if not self.checked:
-            self._check_replay(t, H)
+            self.checked = True
+            check_replay(self.graph.nodes, t, H)
         report = StepReport(t + H, iterations=0)
         if self.control is not None:
             self.control.advance(t, H, report)
@@ -119,24 +119,6 @@ class Implicit(Master):
             self.advance(t, H, 0, report)
         report.columns = self.accelerator.columns
         return report
-
-    def _check_replay(self, t: float, H: float) -> None:
-        """Step every component twice from the same state; `FmuError` if the outputs differ."""
-        self.checked = True
-        for node in self.graph.nodes:
-            outputs = node.fmu.group([p.name for p in node.fmu.ports.values() if _is_real_output(p)])
-            state, outcomes = node.fmu.save(), []
-            for _ in range(2):
-                # what fails here fails again in the step, and is dealt with there
-                with contextlib.suppress(FmuError):
-                    node.inputs.set()
-                    node.fmu.step(t, H)
-                    outputs.get_finite()
-                    outcomes.append(outputs.values.copy())
-                node.fmu.restore(state)
-            node.fmu.release(state)
-            if len(outcomes) == 2:
-                _compare(outputs, t, outcomes[0], outcomes[1])
 
     def advance(self, t: float, H: float, depth: int, report: StepReport) -> None:
         """Advance by `H`, by halves if the iteration does not converge."""
@@ -321,22 +303,3 @@ class Implicit(Master):
             step_node(self.between, node, t, H)
 
         self.crew.round(step)
-
-
-def _is_real_output(port: Port) -> bool:
-    return port.causality == "output" and port.kind == "real"
-
-
-def _compare(outputs: Group, t: float, first: np.ndarray, second: np.ndarray) -> None:
-    """Raise `FmuError` if the two outcomes of the same step (n,) are not the same."""
-    difference = np.abs(first - second) - REPLAY * (np.abs(first) + np.abs(second))
-    if not np.any(difference > 0.0):
-        return
-    worst = int(np.argmax(difference))
-    raise FmuError(
-        outputs.fmu.name,
-        t,
-        ERROR,
-        f"the same step from the same saved state gives {outputs.names[worst]} = {first[worst]:.9g}, then "
-        f"{second[worst]:.9g}: its state is not saved completely; use an explicit master",
-    )

@@ -11,8 +11,9 @@ import numpy as np
 from orchestrator.fmu import Fmu, State
 from orchestrator.graph import Graph, GraphError, Node
 from orchestrator.masters.base import Between, Loads, Master, StepReport, step_node
-from orchestrator.masters.implicit import Scale
 from orchestrator.masters.least_squares import LeastSquares
+from orchestrator.masters.replay import check_replay
+from orchestrator.masters.scale import Scale
 
 
 class ReducedInterface(Master):
@@ -75,6 +76,7 @@ class ReducedInterface(Master):
         graph, report = self.graph, StepReport(t + H)
         graph.exchange_discrete()
         if not self.responses:
+            check_replay(self.rest, t, H)
             self.responses = {node.name: self._response(node, t, H) for node in self.modelled}
             self.inputs.extend([self.x] * 3)
             self.outputs.extend([graph.y.copy()] * 3)

@@ -44,6 +44,7 @@ class OddTest(Fmi2Slave):
             "count_in": 0,
             "flag_in": False,
             "note": "none",
+            "heard": "",
         }
         self.values |= {"y": 0.0, "x": 0.0, "angle": 180.0, "held_out": 0.0, "count": 0, "flag": False}
         self._add(Real, REALS, "parameter")
@@ -57,6 +58,8 @@ class OddTest(Fmi2Slave):
         self._add(Real, ["held_out"], "output", "discrete")
         self._add(Integer, ["count"], "output")
         self._add(Boolean, ["flag"], "output")
+        self._add(String, ["heard"], "input")
+        self._add(String, ["said"], "output")
 
     def _add(self, kind, names, causality, variability=None):
         for name in names:
@@ -75,7 +78,7 @@ class OddTest(Fmi2Slave):
             return 1000.0 * (v["gain"] * v["u"] + v["offset"])
         if name == "held_out":
             return v["x"]
-        return v[name]
+        return v["note" if name == "said" else name]
 
     def to_xml(self, model_options=None):
         from xml.etree.ElementTree import Element, SubElement
