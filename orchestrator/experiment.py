@@ -320,7 +320,7 @@ def _completed(scenario: Scenario, progress: Progress) -> Coupled:
     try:
         coupled = run(scenario, progress)
     except InputError as error:  # an FMU that cannot be stepped so finely
-        raise RunError(f"no reference with a macro step of {scenario.simulation.macro_step:g} s: {error}") from None
+        raise RunError(f"no run with a macro step of {scenario.simulation.macro_step:g} s: {error}") from None
     if coupled.log.error is not None:
         raise RunError(str(coupled.log.error), coupled.log.error.time)
     return coupled
