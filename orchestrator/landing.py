@@ -33,6 +33,9 @@ NOT_NEEDED = ("initial.", ".braked", ".inertia", ".axle_direction", "integration
 INNER_STEPS = {"waveform": 4, "hermite": 4, "point": 1}
 """Inner steps of our cable in a macro step, where the scenario gives no `integration_step`. The error that they leave
 shrinks with the macro step as that of the exchange does, and stays a tenth of it (docs/decisions.md)."""
+LONGEST_ADAPTIVE = 2.5e-3
+"""Longest such step, s, where the master's steps are adaptive: long macro steps are then wanted, and the local error does
+not tell that of the cable's inner steps (docs/masters.md)."""
 
 
 @dataclass(frozen=True)
@@ -187,6 +190,8 @@ def _inner_step(scenario: Scenario, exchange: str) -> dict[str, Value]:
     """Return the longest inner step of our own cable."""
     assert scenario.cable is not None
     step = scenario.simulation.macro_step / INNER_STEPS[exchange]
+    if scenario.master.get("local_tolerance"):
+        step = min(step, LONGEST_ADAPTIVE)
     return {"integration_step": step} if scenario.cable.fmu is None else {}
 
 
