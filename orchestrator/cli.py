@@ -35,6 +35,11 @@ class Commands(TyperGroup):
             for line in str(error).splitlines():
                 _complain(line)
             raise typer.Exit(error.exit_status) from None
+        except BrokenPipeError:
+            raise
+        except OSError as error:  # a full disk, a folder that was taken away
+            _complain(f"{error.filename or 'results'}: {error.strerror}; make room or choose another place with --out")
+            raise typer.Exit(FAILED) from None
         except KeyboardInterrupt:
             _complain("interrupted")
             raise typer.Exit(INTERRUPTED) from None
@@ -322,6 +327,10 @@ def _print_run(coupled: Coupled) -> None:
 
     from orchestrator.plots import panels_for
 
+    if coupled.exchange_asked != coupled.exchange:
+        _complain(
+            f"cable or robot has no means or slopes for exchange {coupled.exchange_asked}: {coupled.exchange} in its place"
+        )
     log, table = coupled.log, Table("signal", "unit", "start", "min", "max", "end", box=None, pad_edge=False)
     for panel in panels_for(coupled.table):
         values = coupled.table[panel.signal] * panel.factor

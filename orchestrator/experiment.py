@@ -95,6 +95,11 @@ class Coupled:
         return self.scenario.simulation.master
 
     @property
+    def exchange_asked(self) -> str:
+        """The exchange that was asked for; cable and robot of a landing may not have what it needs."""
+        return exchange_of(self.scenario) if self.scenario.is_landing else self.exchange
+
+    @property
     def label(self) -> str:
         """Master and macro step, as folders are called."""
         return run_label(self.master, self.log.macro_step)

@@ -8,6 +8,7 @@ from importlib import import_module
 from pathlib import Path
 
 from fmus.recipe import FmuRecipe
+from orchestrator.errors import InputError
 from orchestrator.robots import RobotSpec, catalogue
 
 FOLDER = Path(os.environ.get("LINE_LANDING_FMUS", "fmu"))
@@ -57,5 +58,9 @@ def build_all(folder: Path) -> Iterator[Path]:
 def _ensured(recipe: FmuRecipe, folder: Path) -> Path:
     from fmus.build import ensure_fmu
 
-    folder.mkdir(parents=True, exist_ok=True)
-    return ensure_fmu(recipe, folder)
+    try:
+        folder.mkdir(parents=True, exist_ok=True)
+        return ensure_fmu(recipe, folder)
+    except OSError as error:
+        cure = "choose a folder to write to with LINE_LANDING_FMUS (`build`: --out)"
+        raise InputError(f"{folder}: the FMU {recipe.name} cannot be built there ({error.strerror}); {cure}") from None

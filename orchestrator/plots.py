@@ -82,7 +82,7 @@ def panels_for(table: Table, reference: Table | None = None, chosen: Sequence[st
     common = [name for name in table if name != "time" and (reference is None or name in reference)]
     landing = [panel for panel in LANDING if panel.signal in common]
     names = [name for name in chosen if name in common] or common[:4]
-    return landing or [Panel(name, name, "SI") for name in names]
+    return landing or [Panel(name, name, "FMU's unit") for name in names]
 
 
 def overview(path: Path, run: Table, reference: Table | None, panels: Sequence[Panel]) -> None:
