@@ -2,7 +2,7 @@
 
 import numpy as np
 import pytest
-from scipy.optimize import brentq
+from scipy.optimize import root_scalar
 
 from orchestrator import landing
 from orchestrator.experiment import opened
@@ -40,7 +40,7 @@ def resting(one):
         start = integrate(lambda: problem(one, shift), np.array([0.0, 1e-5])).signals
         return start[FORCE][0] * np.sin(np.radians(50.0)) - WEIGHT
 
-    return brentq(excess, -2e-2, 0.0, rtol=1e-9)
+    return root_scalar(excess, bracket=(-2e-2, 0.0)).root
 
 
 @pytest.mark.parametrize("master", ["interface_jacobian", "iqn_ils"])
