@@ -10,7 +10,7 @@ from orchestrator import experiment
 from orchestrator.compare import Reference, communication_times
 from orchestrator.experiment import Coupled
 from orchestrator.landing import problem
-from orchestrator.monolithic.solve import TOLERANCE, Solution, solve
+from orchestrator.monolithic.solve import Solution, solve
 from orchestrator.scenario import Scenario, load
 
 FOLDER = Path(__file__).resolve().parents[2] / "scenarios"
@@ -45,6 +45,10 @@ STOP = 1.2
 SIGNALS = ("robot.body.position.z", "robot.roll")
 
 
+TRUTH = 1e-11
+"""m, local tolerance of the solution that small errors are judged by."""
+
+
 def scenario(landing: str, master: str | None = None, macro_step: float | None = None, *more: str) -> Scenario:
     """Return a landing over `STOP` s with another master, macro step, and `more` settings."""
     file, robot, settings = (LANDINGS | OTHERS)[landing]
@@ -61,9 +65,9 @@ def reference(landing: str, macro_steps: tuple[float, ...]) -> Reference:
 
 @cache
 def truth(landing: str, macro_steps: tuple[float, ...]) -> Solution:
-    """Return the same with a hundredth of the solver's tolerance, to judge small errors by."""
+    """Return the same with a local tolerance of 1e-11 m, to judge small errors by."""
     one = scenario(landing)
-    return solve(lambda: problem(one), communication_times(STOP, macro_steps), 0.01 * TOLERANCE)
+    return solve(lambda: problem(one), communication_times(STOP, macro_steps), TRUTH)
 
 
 def coupled(landing: str, master: str, macro_step: float) -> Coupled:
