@@ -75,8 +75,8 @@ def test_monolithic_books_balance_to_the_estimated_error():
     assert books.within
     assert books.drift < 1e-7 * books.exchanged
     drifts = []
-    for factor in (16, 256):
-        solution = integrate(lambda: landing.problem(scenario()), times, factor * fine.tolerance)
+    for tolerance in (1.6e-8, 2.56e-7):
+        solution = integrate(lambda: landing.problem(scenario()), times, tolerance)
         drifts.append(audit.of_monolithic({"time": times} | solution.signals, {}).drift)
     assert np.log2(drifts[1] / drifts[0]) == pytest.approx(3.0, abs=0.2)
 

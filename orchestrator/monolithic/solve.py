@@ -20,17 +20,16 @@ from fmus.variables import ModuleError
 from orchestrator.monolithic import system as kernels
 from orchestrator.monolithic.system import N_CONTACT, N_ROBOT, State, System
 
-LONGEST = 6.6e-4
+LONGEST = 9.4e-4
 """s; longest step at the default tolerance, it resolves the cable's waves (docs/verification.md)."""
-EVENT = 1.3e-5
+EVENT = 2.7e-5
 """s; longest step at the default tolerance in which a contact may open, close, begin or cease to slide.
 
 What such a step gets wrong depends on where in it the event falls. For the estimate it shrinks faster than the other
 steps do, so that the coarser solution, whatever the chance, is the one that is wrong.
 """
-TOLERANCE = 5e-11
-"""m, local error of the robot's position a step allowed by default: leaves 2e-9 of the flagship's range, so that the order of
-the coupling shows down to macro steps of 2.5 ms."""
+TOLERANCE = 2e-10
+"""m, local error of the robot's position a step allowed by default: leaves 6e-9 of the flagship's range."""
 NEWTON = 1e-12
 
 
