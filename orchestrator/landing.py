@@ -219,7 +219,8 @@ def _connections(components: Mapping[str, Fmu], exchange: str) -> list[Connectio
         k = name.removeprefix("contact")
         for side, partner in (("cable", f"cable.port[{k}]"), ("wheel", f"robot.wheel[{k}]")):
             found += _links(components, f"{name}.{side}", partner)
-    return [c for c in found if exchange != "point" or "_rate." not in c.source]
+    slopes = ("force_rate.", "moment_rate.")
+    return [c for c in found if exchange != "point" or not any(slope in c.source for slope in slopes)]
 
 
 def _links(components: Mapping[str, Fmu], contact: str, partner: str) -> Iterator[Connection]:
