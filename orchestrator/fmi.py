@@ -9,7 +9,7 @@ from __future__ import annotations
 
 import ctypes
 from collections.abc import Callable
-from ctypes import CFUNCTYPE, byref, c_bool, c_char_p, c_double, c_int, c_size_t, c_void_p
+from ctypes import CFUNCTYPE, byref, c_bool, c_double, c_int, c_size_t, c_void_p
 from functools import partial
 from pathlib import Path
 from typing import Any, ClassVar
@@ -29,7 +29,6 @@ from fmpy.model_description import ModelDescription
 
 OK, WARNING, DISCARD, ERROR, FATAL = range(5)
 LABELS = ("ok", "warning", "discard", "error", "fatal", "pending")
-DERIVATIVE_ARGUMENTS = 6  # of fmi2GetDirectionalDerivative, after the instance
 
 Call = Callable[[], int]
 Sink = Callable[[int, str], None]
@@ -116,11 +115,6 @@ class Fmi2:
             call = self._raw(self.DERIVATIVE, *types)
             tail = (seed.ctypes.data, seed.size, out.ctypes.data, out.size)
         return call(unknown.ctypes.data, unknown.size, known.ctypes.data, known.size, *tail)
-
-    def input_derivatives(self, vr: np.ndarray, orders: np.ndarray, values: np.ndarray) -> Call:
-        """Return the call that sets time derivatives of real inputs (FMI 2.0 alone knows it)."""
-        function = self._raw("fmi2SetRealInputDerivatives", c_void_p, c_size_t, c_void_p, c_void_p)
-        return partial(function, vr.ctypes.data, vr.size, orders.ctypes.data, values.ctypes.data)
 
     def do_step(self, t: float, h: float) -> int:
         """Advance from `t` to `t + h`; rollback behind `t` stays allowed."""
@@ -236,6 +230,5 @@ __all__ = [
     "Call",
     "Fmi2",
     "Fmi3",
-    "c_char_p",
     "finalize_python",
 ]

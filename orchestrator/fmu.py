@@ -101,7 +101,6 @@ class Capabilities:
     serialize: bool
     variable_step: bool
     directional_derivatives: bool
-    input_derivatives: bool
     internal_step: float | None = None
 
 
@@ -508,7 +507,6 @@ def _capabilities(description: ModelDescription) -> Capabilities:
         serialize=bool(interface.canSerializeFMUstate),
         variable_step=bool(interface.canHandleVariableCommunicationStepSize),
         directional_derivatives=bool(interface.providesDirectionalDerivative),
-        input_derivatives=bool(interface.canInterpolateInputs) and str(description.fmiVersion).startswith("2"),
         internal_step=float(interface.fixedInternalStepSize) if interface.fixedInternalStepSize else None,
     )
 

@@ -210,9 +210,17 @@ def step_node(between: Between | None, node: Node, t: float, H: float) -> None:
 
 def vectors(names: list[str]) -> np.ndarray:
     """Return for each name the number of the vector it is a component of, (len(names),) int: x, y, z have one."""
-    stems = [re.sub(r"\.[xyz]$", "", name) for name in names]
-    number = {stem: i for i, stem in enumerate(dict.fromkeys(stems))}
-    return np.array([number[stem] for stem in stems], dtype=np.intp)
+    number = {stem: i for i, stem in enumerate(stems(names))}
+    return np.array([number[_stem(name)] for name in names], dtype=np.intp)
+
+
+def stems(names: list[str]) -> list[str]:
+    """Return the names of those vectors, in the order of their numbers: without the axis."""
+    return list(dict.fromkeys(map(_stem, names)))
+
+
+def _stem(name: str) -> str:
+    return re.sub(r"\.[xyz]$", "", name)
 
 
 def require_rollback(graph: Graph, master: str) -> None:

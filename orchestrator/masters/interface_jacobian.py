@@ -128,7 +128,7 @@ class InterfaceJacobian(Implicit):
         if self.outer == self.slow:
             for model in self.models:
                 self._differentiate(model, t, H, x, states)
-        return self._solve_interface(t, H, x, r, states)[0]
+        return self._solve_interface(t, H, x, r, residual, states)[0]
 
     def trial(
         self, t: float, H: float, x: np.ndarray, tolerance: float, enough: Callable[[], bool], report: StepReport
@@ -147,7 +147,7 @@ class InterfaceJacobian(Implicit):
                     return False
                 for model in self.models:
                     model.learn(H, x, self.scale.values)
-                x, solved = self._solve_interface(t, H, x, r, states)
+                x, solved = self._solve_interface(t, H, x, r, self.scale.norm(r, x, H), states)
                 if solved and enough():
                     break
             return solved
@@ -155,15 +155,15 @@ class InterfaceJacobian(Implicit):
             self.graph.release(states)
 
     def _solve_interface(
-        self, t: float, H: float, x: np.ndarray, r: np.ndarray, states: list[State]
+        self, t: float, H: float, x: np.ndarray, r: np.ndarray, residual: float, states: list[State]
     ) -> tuple[np.ndarray, bool]:
-        """Return the unknowns that meet the equation with the models, the best that were found, and whether they do."""
+        """Return the unknowns that meet the equation with the models, the best that were found, and whether they do;
+        `residual` is the norm of `r`."""
         inner, best = self.accelerator, (np.inf, x)
         inner.begin(H, self.scale.values)
         # the models leave about `contraction` of the residual: to solve more exactly than they are is of no use
-        target = self.inner_tolerance * max(self.tolerance, self.contraction * self.scale.norm(r, x, H))
+        target = self.inner_tolerance * max(self.tolerance, self.contraction * residual)
         for _ in range(self.inner_iterations):
-            residual = self.scale.norm(r, x, H)
             if residual < best[0]:
                 best = (residual, x + r)
             if residual <= target:
@@ -176,6 +176,7 @@ class InterfaceJacobian(Implicit):
                 if not error.recoverable:
                     raise
                 break
+            residual = self.scale.norm(r, x, H)
         inner.reject()
         return best[1], False
 

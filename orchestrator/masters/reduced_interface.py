@@ -83,7 +83,6 @@ class ReducedInterface(Master):
         self.between.begin()
         self.outputs.appendleft(graph.y.copy())
         self.x = self._solve(t, H, self.x, self._coasting(), report)
-        self.scale.accept(self.x)
         self.inputs.appendleft(self.x)
         self._advance(t, H)
         report.columns = self.solver.columns

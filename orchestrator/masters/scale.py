@@ -8,9 +8,9 @@ import numpy as np
 
 from fmus.jit import kernel
 from orchestrator.graph import Graph
-from orchestrator.masters.base import Loads
+from orchestrator.masters.base import Loads, stems, vectors
 
-AXIS, MOMENT = re.compile(r"\.[xyz]$"), re.compile(r"\b(moment|torque)$")
+MOMENT = re.compile(r"\b(moment|torque)$")
 
 
 class Scale:
@@ -34,17 +34,17 @@ class Scale:
     """
 
     def __init__(self, graph: Graph, loads: Loads, absolute: float, lever: float = 0.0):
-        names = [AXIS.sub("", graph.input_names[i]) for i in graph.torn]
-        stems = {name: i for i, name in enumerate(dict.fromkeys(names))}
-        self.vector = np.array([stems[name] for name in names], dtype=np.intp)
-        self.force = np.array([stems.get(MOMENT.sub("force", name), i) for name, i in stems.items()], dtype=np.intp)
+        names = [graph.input_names[i] for i in graph.torn]
+        self.vector = vectors(names)
+        number = {stem: i for i, stem in enumerate(stems(names))}
+        self.force = np.array([number.get(MOMENT.sub("force", stem), i) for stem, i in number.items()], dtype=np.intp)
         where = {int(place): i for i, place in enumerate(graph.torn)}
         self.load = np.arange(len(names))
         for load, rate in loads.fed.tolist():
             if load in where and rate in where:
                 self.load[where[rate]] = where[load]
         self.absolute, self.lever = absolute, lever
-        self.kept, self.largest = np.zeros(len(stems)), np.zeros(len(stems))
+        self.kept, self.largest = np.zeros(len(number)), np.zeros(len(number))
         self.values = np.ones(len(names))
         self._zero = np.zeros(len(names))
 

@@ -83,8 +83,3 @@ def run(figures: Path) -> Result:
     ]
     caption = "Error of all masters over wall time and over cable solves; one line a master, one dot a macro step"
     return Result(rows, [("../images/work_precision.png", caption)], table(found))
-
-
-def _row(master: str, error: float) -> Row:
-    label = f"{master}, 5 ms: largest error of Z over its peak-to-peak"
-    return Row(label, error, 0.0, "monolithic solution", 5e-6, relative=False)
