@@ -18,7 +18,7 @@ from orchestrator.coupling.masters import MASTERS
 from orchestrator.coupling.masters.options import master_options
 from orchestrator.coupling.run.results import read_fields, read_table
 from orchestrator.landing.contract import check_variables, is_met
-from orchestrator.runs.coupled import run
+from orchestrator.runs.coupled import run_coupled
 from orchestrator.scenario.read import load
 from tests.fmus import build
 
@@ -138,7 +138,7 @@ STIFF = {"coupling_stiffness": 1e6, "stiffness": 1e3, "initial_position": 1.0}
 def test_oscillator_with_every_implicit_master(master: str, right: dict[str, float]):
     """At H = 10 ms within 1e-3 of the range; omega H of the coupling is 0.15 and 14."""
     options = [f"components.right.parameters.{name}={value}" for name, value in right.items()]
-    table = run(load(OSCILLATOR, options, master=master)).table
+    table = run_coupled(load(OSCILLATOR, options, master=master)).table
     exact = exact_oscillator(table["time"], *right.values())
     assert np.max(np.abs(table["left.position"] - exact[0])) < 1e-3 * np.ptp(exact[0])
     assert np.max(np.abs(table["right.position"] - exact[1])) < 1e-3 * np.ptp(exact[1])

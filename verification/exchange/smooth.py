@@ -10,7 +10,7 @@ from __future__ import annotations
 
 from pathlib import Path
 
-from orchestrator.runs.reference import reference
+from orchestrator.runs.reference import solve_reference
 from verification.exchange.landing import balance, coupled, relative_error, scenario
 from verification.study import Result, Row, observed_order
 
@@ -28,7 +28,7 @@ NAME, STOP = "landing_200m_point9", 0.3
 
 def run(figures: Path) -> Result:
     """Return the orders and the energy balance."""
-    monolithic = reference(scenario(NAME, STOP), sorted({step for case in CASES for step in case[3]})).table
+    monolithic = solve_reference(scenario(NAME, STOP), sorted({step for case in CASES for step in case[3]})).table
     rows = []
     for case, master, exchange, steps, option, order in CASES:
         made = scenario(
