@@ -13,10 +13,8 @@ from orchestrator.cli import commands as cli
 from orchestrator.coupling.run.results import read_table
 from orchestrator.runs.coupled import run_coupled
 from orchestrator.scenario.read import load
-from tests.fmus import build, compiled, compiler
-from tests.test_cli import LANDING, OSCILLATOR
-
-needs_compiler = pytest.mark.skipif(compiler() is None, reason="no C compiler on this machine")
+from tests.fmus import build, compiled, needs_compiler
+from tests.scenarios import LANDING, OSCILLATOR
 
 LOOP = """
 title = "p' = q, q' = -p"
