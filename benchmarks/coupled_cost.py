@@ -16,9 +16,11 @@ from pathlib import Path
 
 import numpy as np
 
-from orchestrator import experiment, landing
-from orchestrator.monolithic.solve import TOLERANCE, integrate
-from orchestrator.scenario import Scenario, load
+from orchestrator.landing import build as landing
+from orchestrator.landing.monolithic.solve import TOLERANCE, integrate
+from orchestrator.runs.coupled import run_coupled
+from orchestrator.scenario.read import load
+from orchestrator.scenario.types import Scenario
 
 SCENARIO = Path(__file__).parents[1] / "scenarios" / "landing_200m_point9.toml"
 SIGNAL = "robot.body.position.z"
@@ -47,7 +49,7 @@ def error(true: dict[float, float], time: np.ndarray, values: np.ndarray) -> flo
 
 def coupled(scenario: Scenario, true: dict[float, float], master: str, step: float) -> Cost:
     """Run coupled."""
-    run = experiment.run(scenario.changed(master=master, macro_step=step))
+    run = run_coupled(scenario.changed(master=master, macro_step=step))
     return error(true, run.table["time"], run.table[SIGNAL]), run.log.wall / STOP
 
 

@@ -15,9 +15,9 @@ from pathlib import Path
 from time import perf_counter
 from typing import Any
 
-from orchestrator import experiment
-from orchestrator.fmu import Fmu, Group
-from orchestrator.scenario import load
+from orchestrator.coupling.fmu.instance import Fmu, Group
+from orchestrator.runs.coupled import run_coupled
+from orchestrator.scenario.read import load
 
 SCENARIO = Path(__file__).parents[1] / "scenarios" / "landing_200m_point9.toml"
 CALLS = {Group: ("set", "get", "get_finite"), Fmu: ("step", "save", "restore", "release")}
@@ -45,13 +45,13 @@ def main() -> None:
     step = float(sys.argv[1]) if len(sys.argv) > 1 else 0.005
     master = sys.argv[2] if len(sys.argv) > 2 else "interface_jacobian"
     scenario = load(SCENARIO).changed(stop_time=5.0, macro_step=step, master=master)
-    experiment.run(scenario)
-    plain = experiment.run(scenario).log
+    run_coupled(scenario)
+    plain = run_coupled(scenario).log
     for kind, calls in CALLS.items():
         for call in calls:
             setattr(kind, call, clocked(getattr(kind, call), call.removesuffix("_finite")))
     SPENT.clear()
-    log = experiment.run(scenario).log
+    log = run_coupled(scenario).log
     n, unit = len(log.steps), 1e6 / len(log.steps)
     print(f"{master}, {1e3 * step:g} ms: {plain.wall * unit:.0f} µs a macro step ({log.wall * unit:.0f} with clocks), ")
     print("| component | call | µs a macro step | calls | µs a call |\n|---|---|---|---|---|")

@@ -20,10 +20,11 @@ import numpy as np
 from fmpy import extract, read_model_description
 from fmpy.fmi2 import FMU2Slave
 
-from orchestrator.fmu import Fmu
-from orchestrator.graph import Connection, Graph
-from orchestrator.masters import MASTERS
-from orchestrator.simulation import simulate
+from orchestrator.coupling.fmu.instance import Fmu
+from orchestrator.coupling.graph.graph import Graph
+from orchestrator.coupling.graph.links import Connection
+from orchestrator.coupling.masters import MASTERS
+from orchestrator.coupling.run.simulate import simulate
 from tests.fmus import compiled
 
 H = 1e-3

@@ -11,12 +11,12 @@ from time import perf_counter
 
 import numpy as np
 
-from fmus import banded
 from fmus.cable import dynamics
 from fmus.cable.assembly import Model, constrain_vector, iteration_matrix
 from fmus.cable.module import Cable
-from fmus.jit import kernel
-from fmus.variables import Value
+from fmus.kernels import banded
+from fmus.kernels.jit import kernel
+from fmus.module.variables import Value
 
 REPEAT, NUMBER = 20, 500
 TARGET = 15.0

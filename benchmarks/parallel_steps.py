@@ -14,10 +14,11 @@ from time import perf_counter
 
 import numpy as np
 
-from orchestrator.fmu import Fmu
-from orchestrator.graph import Connection, Graph
-from orchestrator.masters import MASTERS
-from orchestrator.simulation import simulate
+from orchestrator.coupling.fmu.instance import Fmu
+from orchestrator.coupling.graph.graph import Graph
+from orchestrator.coupling.graph.links import Connection
+from orchestrator.coupling.masters import MASTERS
+from orchestrator.coupling.run.simulate import simulate
 from tests.fmus import compiled
 
 H = 1e-3

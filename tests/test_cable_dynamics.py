@@ -6,7 +6,7 @@ Where the expected values come from is said in `verification/cable`.
 import numpy as np
 import pytest
 
-from fmus.variables import ModuleError
+from fmus.module.variables import ModuleError
 from verification.cable import point_mass, time_steps
 from verification.cable.setups import TABLE1, cable
 from verification.cable.time_steps import METHODS, SOFT

@@ -6,8 +6,8 @@ import numpy as np
 import pytest
 from typer.testing import CliRunner
 
-from orchestrator.cli import app
-from orchestrator.modes import modes, sample
+from orchestrator.cli.commands import app
+from orchestrator.landing.modes import modes, sample
 from verification.cable import vibration
 from verification.cable.setups import PHYSICAL, RIG, TABLE1, cable
 from verification.cable.taut import SETTINGS as TAUT

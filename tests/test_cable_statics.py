@@ -10,7 +10,7 @@ from hypothesis import strategies as st
 
 from fmus.cable.mesh import nodes
 from fmus.cable.module import Cable
-from fmus.variables import ModuleError
+from fmus.module.variables import ModuleError
 from verification.cable import statics
 from verification.cable.setups import PHYSICAL, RIG, TABLE1, cable, loaded_equilibrium, point, support_forces
 from verification.cable.statics import CONVERGED, RECOMMENDED, Case

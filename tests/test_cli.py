@@ -13,18 +13,19 @@ import pytest
 from scipy.linalg import expm
 
 from fmus.robot.module import robot_table
-from orchestrator import vocabulary
-from orchestrator.contract import check_variables, is_met
-from orchestrator.experiment import run
-from orchestrator.masters import MASTERS
-from orchestrator.results import read_fields, read_table
-from orchestrator.scenario import load
+from orchestrator.catalogue import modules as vocabulary
+from orchestrator.coupling.masters import MASTERS
+from orchestrator.coupling.masters.options import master_options
+from orchestrator.coupling.run.results import read_fields, read_table
+from orchestrator.landing.contract import check_variables, is_met
+from orchestrator.runs.coupled import run
+from orchestrator.scenario.read import load
 from tests.fmus import build
 
 ROOT = Path(__file__).resolve().parents[1]
 OSCILLATOR = str(ROOT / "scenarios" / "oscillator.toml")
 LANDING = str(ROOT / "scenarios" / "landing_200m_point9.toml")
-COMMAND = [sys.executable, "-m", "orchestrator.cli"]
+COMMAND = [sys.executable, "-m", "orchestrator"]
 
 
 def orchestrate(*arguments: object, timeout: float = 300.0) -> subprocess.CompletedProcess[str]:
@@ -75,7 +76,7 @@ def test_help_names_every_command():
 
 def test_list_shows_scenarios_robots_and_masters():
     done = orchestrate("list")
-    names = [*vocabulary.robots(), *vocabulary.masters(), *(p.name for p in (ROOT / "scenarios").glob("*.toml"))]
+    names = [*vocabulary.robots(), *master_options(), *(p.name for p in (ROOT / "scenarios").glob("*.toml"))]
     assert done.returncode == 0 and all(name in done.stdout for name in names)
 
 
@@ -186,11 +187,12 @@ def test_a_failure_in_mid_run_keeps_the_results(tmp_path: Path):
 
 CTRL_C = """
 import os, signal, sys
-from orchestrator import cli, experiment
-run = experiment.run
+from orchestrator.cli import commands
+from orchestrator.runs import coupled
+run = coupled.run_coupled
 press = lambda time: time > 0.5 and os.kill(os.getpid(), signal.SIGINT)
-experiment.run = lambda scenario, progress: run(scenario, press)
-cli.main(sys.argv[1:])
+coupled.run_coupled = lambda scenario, progress: run(scenario, press)
+commands.main(sys.argv[1:])
 """
 
 

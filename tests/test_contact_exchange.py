@@ -11,7 +11,7 @@ from scipy.spatial.transform import Rotation
 from fmus.contact import exchange
 from fmus.contact.law import LEFT, OPEN, OUT_SIZE, SLIP, STICK, contact_wrench
 from fmus.contact.module import Contact
-from fmus.variables import ModuleError
+from fmus.module.variables import ModuleError
 
 HALF = math.radians(50.0)
 SIN = math.sin(HALF)

@@ -11,13 +11,15 @@ from pathlib import Path
 import numpy as np
 import pytest
 
-from orchestrator.derivatives import Partials, states
-from orchestrator.fmu import Fmu, FmuError
-from orchestrator.graph import Connection, Graph
-from orchestrator.masters import MASTERS
-from orchestrator.masters.base import Between, Loads
-from orchestrator.masters.jacobian import OwnDerivatives
-from orchestrator.simulation import Log, simulate
+from orchestrator.coupling.fmu.derivatives import Partials, states
+from orchestrator.coupling.fmu.instance import Fmu, FmuError
+from orchestrator.coupling.graph.graph import Graph
+from orchestrator.coupling.graph.links import Connection
+from orchestrator.coupling.masters import MASTERS
+from orchestrator.coupling.run.log import Log
+from orchestrator.coupling.run.simulate import simulate
+from orchestrator.coupling.stepping.interpolation import Between, Loads
+from orchestrator.coupling.stepping.jacobian import OwnDerivatives
 from tests.fmus import MILD, compiled, compiler, oscillator
 from tests.test_fmu import described, started
 

@@ -10,13 +10,19 @@ import signal
 import numpy as np
 import pytest
 
-from orchestrator import estimate, experiment
-from orchestrator.errors import InputError
-from orchestrator.fmu import Fmu, FmuError
-from orchestrator.graph import Connection, Graph
-from orchestrator.masters.step_control import SAFETY, StepControl
-from orchestrator.scenario import Scenario, load
-from orchestrator.simulation import Log
+from orchestrator.coupling.errors import InputError
+from orchestrator.coupling.fmu.instance import Fmu, FmuError
+from orchestrator.coupling.graph.graph import Graph
+from orchestrator.coupling.graph.links import Connection
+from orchestrator.coupling.run.log import Log
+from orchestrator.coupling.stepping.step_control import SAFETY, StepControl
+from orchestrator.runs import estimate
+from orchestrator.runs.coupled import run_coupled
+from orchestrator.runs.estimate import estimate_error
+from orchestrator.runs.files import summary
+from orchestrator.runs.record import Coupled
+from orchestrator.scenario.read import load
+from orchestrator.scenario.types import Scenario
 from tests.fmus import fmu
 from tests.test_cli import LANDING, OSCILLATOR, exact_oscillator
 from tests.test_masters import ITERATED, run
@@ -131,14 +137,14 @@ CASES = [
 def test_estimate_of_the_oscillator_is_within_a_factor_three(kind, master, H):
     """Against the exponential of the 4 x 4 matrix; the order is the declared one, so the rule is nearly exact."""
     settings = [f"simulation.macro_step={H}", "simulation.stop_time=2.0", f"simulation.estimate={kind}"]
-    coupled = experiment.run(load(OSCILLATOR, settings, master=master))
-    experiment.estimate(coupled)
+    coupled = run_coupled(load(OSCILLATOR, settings, master=master))
+    estimate_error(coupled)
     exact = dict(zip(("left.position", "right.position"), exact_oscillator(coupled.table["time"]), strict=True))
     assert list(coupled.estimated_error) == list(exact)
     for name, values in exact.items():
         error = np.max(np.abs(coupled.table[name] - values))
         assert 1 / 3 < coupled.estimated_error[name] / error < 3
-    assert experiment.summary(coupled)["estimated_error"] == coupled.estimated_error
+    assert summary(coupled)["estimated_error"] == coupled.estimated_error
 
 
 def landing(*settings: str) -> Scenario:
@@ -190,19 +196,19 @@ def test_factor_by_hand(kind, master, exchange, expected):
     assert estimate.factor(scenario, exchange) == pytest.approx(expected)
 
 
-def finished() -> experiment.Coupled:
-    return experiment.run(load(OSCILLATOR, ["simulation.stop_time=0.1"]))
+def finished() -> Coupled:
+    return run_coupled(load(OSCILLATOR, ["simulation.stop_time=0.1"]))
 
 
 def test_no_estimate_where_none_is_asked_for():
-    coupled = experiment.run(load(OSCILLATOR, ["simulation.stop_time=0.1", "simulation.estimate=none"]))
-    experiment.estimate(coupled)
+    coupled = run_coupled(load(OSCILLATOR, ["simulation.stop_time=0.1", "simulation.estimate=none"]))
+    estimate_error(coupled)
     assert coupled.estimated_error == {} and coupled.estimate_failure == ""
 
 
 def test_ctrl_c_in_the_second_run_leaves_the_first():
     coupled = finished()
-    experiment.estimate(coupled, lambda time: signal.raise_signal(signal.SIGINT) if time > 0.031 else None)
+    estimate_error(coupled, lambda time: signal.raise_signal(signal.SIGINT) if time > 0.031 else None)
     assert coupled.estimate_failure == "interrupted at t = 0.035 s"
     assert coupled.log.error is None and np.isnan(list(coupled.estimated_error.values())).all()
 
@@ -217,7 +223,7 @@ def test_failure_of_the_second_run_is_said(monkeypatch):
         step(self, t, h)
 
     monkeypatch.setattr(Fmu, "step", fixed)
-    experiment.estimate(coupled)
+    estimate_error(coupled)
     assert "steps of 10 ms only" in coupled.estimate_failure
     assert list(coupled.estimated_error) == ["left.position", "right.position"]
     assert np.isnan(list(coupled.estimated_error.values())).all()

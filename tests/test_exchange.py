@@ -13,9 +13,11 @@ import numpy as np
 import pytest
 from scipy.integrate import solve_ivp
 
-from orchestrator.graph import Connection, Graph
-from orchestrator.masters import MASTERS
-from orchestrator.simulation import Log, simulate
+from orchestrator.coupling.graph.graph import Graph
+from orchestrator.coupling.graph.links import Connection
+from orchestrator.coupling.masters import MASTERS
+from orchestrator.coupling.run.log import Log
+from orchestrator.coupling.run.simulate import simulate
 from tests.fmus import chain, chain_solution, fmu
 
 WAVEFORM, HERMITE, POINT = 0.0, 1.0, 2.0

@@ -21,10 +21,10 @@ from fmpy.validation import validate_fmu
 TESTS = Path(__file__).resolve().parent
 sys.path.insert(0, str(TESTS / "modules"))
 
-from fmus.build import build_fmu, ensure_fmu, ensure_fmus, is_stale, rename_imports  # noqa: E402
-from fmus.model_description import base_unit  # noqa: E402
-from fmus.recipe import FmuRecipe  # noqa: E402
-from fmus.variables import ModuleError  # noqa: E402
+from fmus.face.build import build_fmu, ensure_fmu, ensure_fmus, is_stale, rename_imports
+from fmus.face.model_description import base_unit
+from fmus.module.recipe import FmuRecipe
+from fmus.module.variables import ModuleError
 from tests.fmi import Instance  # noqa: E402
 
 RECIPE = FmuRecipe("oscillator", "oscillator.module:Oscillator", "Damped oscillator", {"n_forces": 2}, {"damping": 0.3})
@@ -311,7 +311,7 @@ def test_two_versions_in_one_process_run_their_own_code(folder, tmp_path):
         shutil.copytree(original, source / original.name, ignore=shutil.ignore_patterns("__pycache__"))
     module = source / "oscillator" / "module.py"
     module.write_text(module.read_text().replace('"position": x,', '"position": 10.0 * x,'))
-    assemble = ["-m", "fmus.build", "--assemble", tmp_path / "oscillator.fmu"]
+    assemble = ["-m", "fmus.face.build", "--assemble", tmp_path / "oscillator.fmu"]
     done = run_python(assemble, tmp_path, [source], input=json.dumps(RECIPE.as_dict()))
     assert done.returncode == 0, done.stderr
     changed = fmpy.extract(str(tmp_path / "oscillator.fmu"), str(tmp_path / "unzipped"))

@@ -11,10 +11,13 @@ from pathlib import Path
 import numpy as np
 import pytest
 
-from orchestrator.fmu import NOT_FINITE, TIMEOUT, Fmu, FmuError, suffixed, unzip_folder
-from orchestrator.graph import Connection, Graph
-from orchestrator.masters import MASTERS
-from orchestrator.simulation import simulate
+from orchestrator.coupling.exchange import suffixed
+from orchestrator.coupling.fmu.description import unzip_folder
+from orchestrator.coupling.fmu.instance import NOT_FINITE, TIMEOUT, Fmu, FmuError
+from orchestrator.coupling.graph.graph import Graph
+from orchestrator.coupling.graph.links import Connection
+from orchestrator.coupling.masters import MASTERS
+from orchestrator.coupling.run.simulate import simulate
 from tests.fmus import build, compiled, compiler, fmu
 
 

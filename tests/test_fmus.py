@@ -6,7 +6,7 @@ import fmpy
 import pytest
 from fmpy.validation import validate_fmu
 
-from fmus.build import build_fmu, recipes
+from fmus.face.build import build_fmu, recipes
 from tests.fmi import Instance
 
 STARTS = {

@@ -5,10 +5,11 @@ from __future__ import annotations
 import numpy as np
 import pytest
 
-from orchestrator.fmu import Fmu
-from orchestrator.graph import Connection, Graph, GraphError
-from orchestrator.masters import MASTERS
-from orchestrator.simulation import simulate
+from orchestrator.coupling.fmu.instance import Fmu
+from orchestrator.coupling.graph.graph import Graph
+from orchestrator.coupling.graph.links import Connection, GraphError
+from orchestrator.coupling.masters import MASTERS
+from orchestrator.coupling.run.simulate import simulate
 from tests.fmus import MILD, compiled, compiler, fmu, oscillator
 
 needs_compiler = pytest.mark.skipif(compiler() is None, reason="no C compiler on this machine")

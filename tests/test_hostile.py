@@ -9,10 +9,10 @@ from pathlib import Path
 import numpy as np
 import pytest
 
-from orchestrator import cli
-from orchestrator.experiment import run
-from orchestrator.results import read_table
-from orchestrator.scenario import load
+from orchestrator.cli import commands as cli
+from orchestrator.coupling.run.results import read_table
+from orchestrator.runs.coupled import run
+from orchestrator.scenario.read import load
 from tests.fmus import build, compiled, compiler
 from tests.test_cli import LANDING, OSCILLATOR
 

@@ -12,10 +12,12 @@ from contextlib import contextmanager
 import numpy as np
 import pytest
 
-from orchestrator.fmu import FmuError
-from orchestrator.graph import Connection, Graph, GraphError
-from orchestrator.masters import MASTERS
-from orchestrator.simulation import Log, simulate
+from orchestrator.coupling.fmu.instance import FmuError
+from orchestrator.coupling.graph.graph import Graph
+from orchestrator.coupling.graph.links import Connection, GraphError
+from orchestrator.coupling.masters import MASTERS
+from orchestrator.coupling.run.log import Log
+from orchestrator.coupling.run.simulate import simulate
 from tests.fmus import MILD, STIFF, chain, chain_solution, fmu, oscillator, oscillator_solution
 
 POSITIONS = ["a.position", "b.position"]

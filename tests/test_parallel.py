@@ -8,12 +8,14 @@ from time import perf_counter, sleep
 import numpy as np
 import pytest
 
-from orchestrator.fmu import TIMEOUT, Fmu
-from orchestrator.graph import Connection, Graph
-from orchestrator.masters import MASTERS
-from orchestrator.masters.base import Master
-from orchestrator.masters.parallel import processors
-from orchestrator.simulation import Log, simulate
+from orchestrator.coupling.fmu.instance import TIMEOUT, Fmu
+from orchestrator.coupling.graph.graph import Graph
+from orchestrator.coupling.graph.links import Connection
+from orchestrator.coupling.masters import MASTERS
+from orchestrator.coupling.run.log import Log
+from orchestrator.coupling.run.simulate import simulate
+from orchestrator.coupling.stepping.master import Master
+from orchestrator.coupling.stepping.parallel import processors
 from tests.fmus import MILD, compiled, compiler, oscillator
 
 pytestmark = pytest.mark.skipif(compiler() is None, reason="no C compiler on this machine")

@@ -9,18 +9,18 @@ from fmpy.util import read_csv
 from hypothesis import given, settings
 from hypothesis import strategies as st
 
-from orchestrator.compare import (
-    Comparison,
-    Reference,
-    Run,
-    communication_times,
-    matching_rows,
-    observed_order,
-    signal_errors,
+from orchestrator.coupling.errors import InputError
+from orchestrator.coupling.run.compare import communication_times, matching_rows, observed_order, signal_errors
+from orchestrator.coupling.run.results import (
+    RunDirectory,
+    default_directory,
+    read_fields,
+    read_json,
+    read_table,
+    replacing,
 )
-from orchestrator.errors import InputError
-from orchestrator.experiment import common_divisor
-from orchestrator.results import RunDirectory, default_directory, read_fields, read_json, read_table, replacing
+from orchestrator.runs.compare import Comparison, Reference, Run
+from orchestrator.runs.reference import common_divisor
 
 
 @pytest.fixture

@@ -10,10 +10,10 @@ from scipy.integrate import solve_ivp
 from scipy.spatial.transform import Rotation
 from scipy.special import ellipj, ellipk
 
+from fmus.kernels.rotations import quaternion_rate
+from fmus.module.variables import ModuleError
 from fmus.robot import Robot, rigid_body, robot_table
 from fmus.robot.module import body_parameters, initial_state
-from fmus.rotations import quaternion_rate
-from fmus.variables import ModuleError
 
 EPS = np.finfo(float).eps
 GENERAL = {

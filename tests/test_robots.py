@@ -5,7 +5,7 @@ import math
 import pytest
 
 from fmus.robot import Robot
-from orchestrator.robots import FOLDER, RobotError, catalogue, load_robot
+from orchestrator.catalogue.robot_spec import FOLDER, RobotError, catalogue, load_robot
 
 CABLE_DIAMETER = 0.018
 

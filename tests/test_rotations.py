@@ -6,7 +6,7 @@ from hypothesis import given, settings
 from hypothesis import strategies as st
 from scipy.spatial.transform import Rotation
 
-from fmus import rotations
+from fmus.kernels import rotations
 
 ROUND_OFF = 1e-14
 components = st.floats(-1.0, 1.0, allow_subnormal=False)

@@ -4,8 +4,9 @@ from pathlib import Path
 
 import pytest
 
-from orchestrator.errors import InputError
-from orchestrator.scenario import Scenario, load
+from orchestrator.coupling.errors import InputError
+from orchestrator.scenario.read import load
+from orchestrator.scenario.types import Scenario
 
 FOLDER = Path(__file__).resolve().parents[1] / "scenarios"
 LANDINGS = sorted(path for path in FOLDER.glob("*.toml") if "[landing]" in path.read_text(encoding="utf-8"))

@@ -11,9 +11,11 @@ from types import SimpleNamespace
 import numpy as np
 import pytest
 
-from orchestrator import experiment
-from orchestrator.masters.step_control import joined
-from orchestrator.scenario import load
+from orchestrator.coupling.stepping.step_control import joined
+from orchestrator.runs.compare import held_against
+from orchestrator.runs.coupled import run_coupled
+from orchestrator.runs.reference import solve_reference
+from orchestrator.scenario.read import load
 from tests.test_cli import LANDING
 from tests.test_masters import IMPLICIT, MILD, POSITIONS, faulty_oscillator, oscillator, oscillator_solution, run
 
@@ -77,9 +79,9 @@ def test_hard_impact_takes_fewer_solves_than_fixed_steps():
 
     The roll of both is what the impact leaves in the first tenth of a second.
     """
-    reference = experiment.reference(drop(0.02), [0.00125])
-    fixed = experiment.held_against(experiment.run(drop(0.00125)), reference)
-    adaptive = experiment.held_against(experiment.run(drop(0.02, "master.local_tolerance=1e-6")), reference)
+    reference = solve_reference(drop(0.02), [0.00125])
+    fixed = held_against(run_coupled(drop(0.00125)), reference)
+    adaptive = held_against(run_coupled(drop(0.02, "master.local_tolerance=1e-6")), reference)
     z, roll = "robot.body.position.z", "robot.roll"
     assert adaptive.unconverged_steps == 0
     assert adaptive.cable_steps < fixed.cable_steps
@@ -89,7 +91,7 @@ def test_hard_impact_takes_fewer_solves_than_fixed_steps():
 
 def test_steps_of_a_run_say_what_was_rejected():
     """A column beside the sub-steps; the touch of the drop is tried with a length that does not do."""
-    table = experiment.run(drop(0.04, "master.local_tolerance=1e-6", "simulation.stop_time=0.12")).steps_table
+    table = run_coupled(drop(0.04, "master.local_tolerance=1e-6", "simulation.stop_time=0.12")).steps_table
     assert np.sum(table["rejected"]) >= 1
     assert table["subdivisions"][0] == 1 < table["subdivisions"][-1]
     assert np.all(table["estimate"] <= 1e-6)

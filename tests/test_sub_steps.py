@@ -11,14 +11,16 @@ from pathlib import Path
 import numpy as np
 import pytest
 
-from orchestrator import experiment
-from orchestrator.errors import InputError
-from orchestrator.fmu import Fmu
-from orchestrator.graph import Connection, Graph, GraphError
-from orchestrator.masters import MASTERS
-from orchestrator.scenario import load
-from orchestrator.simulation import simulate
-from orchestrator.sub_steps import SubStepped
+from orchestrator.coupling.errors import InputError
+from orchestrator.coupling.fmu.instance import Fmu
+from orchestrator.coupling.fmu.sub_steps import SubStepped
+from orchestrator.coupling.graph.graph import Graph
+from orchestrator.coupling.graph.links import Connection, GraphError
+from orchestrator.coupling.masters import MASTERS
+from orchestrator.coupling.run.simulate import simulate
+from orchestrator.runs.components import opened
+from orchestrator.runs.coupled import run_coupled
+from orchestrator.scenario.read import load
 from tests.fmus import MILD, compiled, compiler, fmu, oscillator, oscillator_solution
 from tests.test_fmu import described, started
 from tests.test_masters import IMPLICIT, ITERATED, POINT, POSITIONS, faulty_oscillator, run
@@ -184,7 +186,7 @@ def test_steps_in_a_scenario():
     runs = []
     for steps in (1, 3):
         scenario = load(OSCILLATOR, ["simulation.stop_time=0.5", f"components.right.steps={steps}"])
-        coupled = experiment.run(scenario)
+        coupled = run_coupled(scenario)
         assert coupled.log.error is None
         runs.append(coupled)
     assert [run.log.solves["right"] // run.log.solves["left"] for run in runs] == [1, 3]
@@ -202,7 +204,7 @@ def test_validation_finds_a_fixed_internal_step(tmp_path: Path):
     scenario = tmp_path / "lag.toml"
     times = "[simulation]\nstop_time = 0.02\nmacro_step = 0.01\n"
     scenario.write_text(f'title = "A lag"\n{times}[components.lag]\nfmu = "{path}"\nsteps = 2\n', encoding="utf-8")
-    with pytest.raises(InputError, match="no multiple of its fixed internal step"), experiment.opened(load(scenario)):
+    with pytest.raises(InputError, match="no multiple of its fixed internal step"), opened(load(scenario)):
         pass
-    with experiment.opened(load(scenario, ["components.lag.steps=5"])) as graph:
+    with opened(load(scenario, ["components.lag.steps=5"])) as graph:
         assert graph.components["lag"].steps == 5  # type: ignore[attr-defined]

@@ -4,10 +4,13 @@ import numpy as np
 import pytest
 from typer.testing import CliRunner
 
-from fmus.variables import ModuleError
-from orchestrator import audit, cli, experiment, landing
-from orchestrator.monolithic.solve import integrate
-from orchestrator.scenario import load
+from fmus.module.variables import ModuleError
+from orchestrator.cli import commands as cli
+from orchestrator.landing import audit
+from orchestrator.landing import build as landing
+from orchestrator.landing.monolithic.solve import integrate
+from orchestrator.runs.coupled import run_coupled
+from orchestrator.scenario.read import load
 from tests.test_system_energy import SCENARIOS, scenario
 
 FREE = {"robot.parameters.wheel[1].braked": "false"}
@@ -23,7 +26,7 @@ def monolithic(one, tolerance=1e-9):
 def test_falling_off_is_seen_and_the_books_still_balance():
     """Pushed sideways at 2 m/s: it rides up a wall of the groove, leaves it, and falls freely from then on."""
     one = scenario(stop=0.6, **PUSH)
-    coupled, reference = experiment.run(one), monolithic(one)
+    coupled, reference = run_coupled(one), monolithic(one)
     assert coupled.fallen == ["contact1"]
     for table in (coupled.table, reference):
         gone = table["contact1.status"] == 3
@@ -54,7 +57,7 @@ def test_slides_where_the_wedge_effect_says(kind, factor, slides):
     rest: from some cm/s in less than 2 s at the deceleration 0.15 g sin 5°."""
     mu = factor * np.tan(np.radians(5.0)) * np.sin(np.radians(50.0))
     one = scenario("rig_10m_inclined", 5.0, **{"contact.parameters.friction_coefficient": mu})
-    table = experiment.run(one).table if kind == "coupled" else monolithic(one)
+    table = run_coupled(one).table if kind == "coupled" else monolithic(one)
     late = table["contact1.cable.s"][table["time"] >= 4.0]
     if slides:
         assert late[-1] - late[0] > 0.03
@@ -68,7 +71,7 @@ def test_a_driven_wheel_travels_and_both_solvers_agree():
     The wheel passes from element to element, which are 4 cm and more long here.
     """
     one = scenario("rig_10m", 1.0, **FREE, **{"robot.inputs.wheel[1].drive_torque": 2.0})
-    coupled, reference = experiment.run(one), monolithic(one)
+    coupled, reference = run_coupled(one), monolithic(one)
     nodes = landing.problem(one).cable.model.s
     s = reference["contact1.cable.s"]
     assert np.sum((nodes > min(s)) & (nodes < max(s))) >= 5
@@ -90,7 +93,7 @@ def test_a_driven_wheel_travels_and_both_solvers_agree():
 def test_lands_near_a_support():
     """20 cm from the support the line is stiff: coupled and monolithic still agree."""
     one = scenario(stop=0.3, **{"landing.position": 0.2, "cable.parameters.grading_position": -1.0})
-    table, reference = experiment.run(one).table, monolithic(one)
+    table, reference = run_coupled(one).table, monolithic(one)
     scale = np.ptp(reference["robot.body.position.z"])
     assert 1e-4 < scale < 0.1
     assert np.max(np.abs(table["robot.body.position.z"] - reference["robot.body.position.z"])) < 1e-3 * scale
@@ -102,7 +105,7 @@ def test_running_past_the_support_is_a_clear_error():
     one = scenario("rig_10m", 3.0, **FREE, **drive)
     with pytest.raises(ModuleError, match="past a support"):
         monolithic(one)
-    coupled = experiment.run(one)
+    coupled = run_coupled(one)
     assert coupled.log.error is not None
     assert "past a support" in str(coupled.log.error)
     assert coupled.table["contact1.cable.s"][-1] > 9.8
@@ -114,9 +117,9 @@ def test_point_tends_to_the_same_motion_as_waveform():
     stop, step = 0.5, 0.0025
     sets = [f"simulation.stop_time={stop}", "simulation.master=iqn_ils"]
     path = SCENARIOS / "landing_200m_point9.toml"
-    expected = experiment.run(load(path, [*sets, f"simulation.macro_step={step}"])).table["robot.roll"]
+    expected = run_coupled(load(path, [*sets, f"simulation.macro_step={step}"])).table["robot.roll"]
     errors = []
     for parts in (2, 4):
         one = load(path, [*sets, f"simulation.macro_step={step / parts}", "simulation.exchange=point"])
-        errors.append(np.max(np.abs(experiment.run(one).table["robot.roll"][::parts] - expected)))
+        errors.append(np.max(np.abs(run_coupled(one).table["robot.roll"][::parts] - expected)))
     assert errors[1] < 0.5 * errors[0]

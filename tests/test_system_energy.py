@@ -5,14 +5,17 @@ from pathlib import Path
 import numpy as np
 import pytest
 
-from fmus.rotations import from_euler, rotate
-from orchestrator import audit, experiment, landing
-from orchestrator.experiment import opened
-from orchestrator.masters import MASTERS
-from orchestrator.monolithic import solve
-from orchestrator.monolithic.solve import integrate
-from orchestrator.scenario import load
-from orchestrator.simulation import simulate
+from fmus.kernels.rotations import from_euler, rotate
+from orchestrator.coupling.masters import MASTERS
+from orchestrator.coupling.run.simulate import simulate
+from orchestrator.landing import audit
+from orchestrator.landing import build as landing
+from orchestrator.landing.monolithic import solve
+from orchestrator.landing.monolithic.solve import integrate
+from orchestrator.runs.components import opened
+from orchestrator.runs.coupled import run_coupled
+from orchestrator.runs.files import summary
+from orchestrator.scenario.read import load
 
 SCENARIOS = Path(__file__).parent.parent / "scenarios"
 
@@ -26,7 +29,7 @@ def scenario(name="landing_200m_point9", stop=1.0, master=None, macro_step=0.005
 
 @pytest.fixture(scope="module")
 def flagship():
-    return experiment.run(scenario())
+    return run_coupled(scenario())
 
 
 def test_terms_and_sources_add_up():
@@ -61,7 +64,7 @@ def test_coupled_books_balance(flagship):
     assert books.drift < 1e-6 * books.exchanged
     assert books.within
     assert books.warning() is None
-    content = experiment.summary(flagship)["energy"]
+    content = summary(flagship)["energy"]
     assert content["verdict"] == "pass"
     assert content["drift_J"] == books.drift
 
@@ -87,7 +90,7 @@ def test_books_balance_in_impact_and_under_control(case):
     control = {"robot.inputs.thrust": 150.0, "robot.inputs.torque.x": 2.0, "robot.inputs.torque.z": 0.2}
     control |= {"robot.parameters.wheel[1].braked": "false", "robot.inputs.wheel[1].drive_torque": 1.5}
     one = scenario("drop_5cm", 0.3) if case == "drop_5cm" else scenario(stop=0.5, **control)
-    coupled = experiment.run(one)
+    coupled = run_coupled(one)
     solution = solve(lambda: landing.problem(one), coupled.table["time"])
     books = audit.of_monolithic({"time": solution.time} | solution.signals, solution.estimated_error)
     assert books.within
@@ -100,7 +103,7 @@ def test_books_balance_in_impact_and_under_control(case):
 
 def test_explicit_coupling_is_caught():
     """Jacobi at 1 ms chatters on the contact and makes energy: the audit says so, and where."""
-    coupled = experiment.run(scenario(stop=0.4, master="jacobi", macro_step=1e-3))
+    coupled = run_coupled(scenario(stop=0.4, master="jacobi", macro_step=1e-3))
     assert not coupled.energy.within
     assert "interface contact1" in coupled.energy.warning()
 

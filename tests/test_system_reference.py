@@ -6,11 +6,11 @@ from scipy.integrate import solve_ivp
 
 from fmus.cable.assembly import add_inertia, add_load, constrain_vector, element_work, internal_force, interpolate
 from fmus.contact.law import contact_wrench, law_parameters
+from fmus.kernels.rotations import normalize, quaternion_rate
 from fmus.robot import rigid_body as rb
 from fmus.robot.module import body_parameters, initial_state
-from fmus.rotations import normalize, quaternion_rate
-from orchestrator import landing
-from orchestrator.monolithic.solve import integrate, solve
+from orchestrator.landing import build as landing
+from orchestrator.landing.monolithic.solve import integrate, solve
 from tests.test_system_energy import scenario
 
 

@@ -4,11 +4,11 @@ import numpy as np
 import pytest
 from scipy.optimize import root_scalar
 
-from orchestrator import landing
-from orchestrator.experiment import opened
-from orchestrator.masters import MASTERS
-from orchestrator.monolithic.solve import integrate, solve
-from orchestrator.simulation import simulate
+from orchestrator.coupling.masters import MASTERS
+from orchestrator.coupling.run.simulate import simulate
+from orchestrator.landing import build as landing
+from orchestrator.landing.monolithic.solve import integrate, solve
+from orchestrator.runs.components import opened
 from tests.test_system_energy import scenario
 
 STOP, STEP = 0.1, 0.005

@@ -6,9 +6,10 @@ Tolerances are round-off (1e-16 of 200 m) times what the motion makes grow in th
 import numpy as np
 import pytest
 
-from fmus.rotations import from_rotation_vector, multiply
-from orchestrator import experiment, landing
-from orchestrator.monolithic.solve import Integrator, integrate
+from fmus.kernels.rotations import from_rotation_vector, multiply
+from orchestrator.landing import build as landing
+from orchestrator.landing.monolithic.solve import Integrator, integrate
+from orchestrator.runs.coupled import run_coupled
 from tests.test_system_energy import scenario
 
 ROUND_OFF = 1e-10
@@ -21,7 +22,7 @@ that is up to 7e-8."""
 def run(kind, one):
     """The signals of a scenario, coupled or monolithic."""
     if kind == "coupled":
-        return experiment.run(one).table
+        return run_coupled(one).table
     times = np.arange(round(one.simulation.stop_time / 0.005) + 1) * 0.005
     return integrate(lambda: landing.problem(one), times).signals
 

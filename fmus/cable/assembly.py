@@ -7,7 +7,7 @@ from typing import NamedTuple
 import numpy as np
 
 from fmus.cable import element
-from fmus.jit import kernel
+from fmus.kernels.jit import kernel
 
 HALF_BANDWIDTH = 11
 """Two neighbouring nodes of six coordinates each."""

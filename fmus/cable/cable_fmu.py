@@ -1,5 +1,5 @@
 """The FMU of the cable."""
 
-from fmus.recipe import FmuRecipe
+from fmus.module.recipe import FmuRecipe
 
 RECIPE = FmuRecipe("cable", "fmus.cable.module:Cable", "ANCF cable between two supports")

@@ -12,7 +12,6 @@ from typing import NamedTuple
 
 import numpy as np
 
-from fmus import banded
 from fmus.cable.assembly import (
     HALF_BANDWIDTH,
     ElementWork,
@@ -29,7 +28,8 @@ from fmus.cable.assembly import (
     kinetic_energy,
     locate,
 )
-from fmus.jit import kernel
+from fmus.kernels import banded
+from fmus.kernels.jit import kernel
 
 N_PORTS = 4
 DISSIPATED, LAST_INNER, LAST_MACRO, WORK = range(4)

@@ -16,7 +16,7 @@ from __future__ import annotations
 
 import numpy as np
 
-from fmus.jit import kernel, summing_kernel
+from fmus.kernels.jit import kernel, summing_kernel
 
 N_GAUSS = 5
 _x, _w = np.polynomial.legendre.leggauss(N_GAUSS)

@@ -9,8 +9,8 @@ from fmus.cable import dynamics
 from fmus.cable.assembly import Model, interpolate
 from fmus.cable.dynamics import N_PORTS
 from fmus.cable.statics import equilibrium, mesh_model
-from fmus.time_integration import collocation, generalized_alpha
-from fmus.variables import ModuleError, Variable, VariableTable, vector
+from fmus.kernels.time_integration import collocation, generalized_alpha
+from fmus.module.variables import ModuleError, Variable, VariableTable, vector
 
 N_SHAPE = 41
 """Points at which the shape of the cable is shown, equally spaced in unstretched arc length."""

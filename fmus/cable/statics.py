@@ -5,7 +5,6 @@ from __future__ import annotations
 import numpy as np
 from scipy.optimize import root_scalar
 
-from fmus import banded
 from fmus.cable.assembly import (
     HALF_BANDWIDTH,
     Model,
@@ -16,7 +15,8 @@ from fmus.cable.assembly import (
     iteration_matrix,
 )
 from fmus.cable.mesh import nodes
-from fmus.variables import ModuleError
+from fmus.kernels import banded
+from fmus.module.variables import ModuleError
 
 MAX_ITERATIONS = 300
 TOLERANCE = 1e-13

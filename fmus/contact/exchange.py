@@ -13,7 +13,7 @@ import numpy as np
 from numpy.polynomial import legendre
 
 from fmus.contact.law import LEFT, OK, SLIP, axle, foot, friction, lateral, walls
-from fmus.jit import kernel
+from fmus.kernels.jit import kernel
 
 POINT, WAVEFORM, HERMITE = 0, 1, 2
 

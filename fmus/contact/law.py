@@ -11,8 +11,8 @@ import math
 
 import numpy as np
 
-from fmus.jit import kernel
-from fmus.variables import VariableTable
+from fmus.kernels.jit import kernel
+from fmus.module.variables import VariableTable
 
 PARAMETERS = (
     "stiffness",

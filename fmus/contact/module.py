@@ -8,7 +8,7 @@ import numpy as np
 
 from fmus.contact import exchange
 from fmus.contact.law import NO_AXLE, NO_TANGENT, NOT_FINITE, OPEN, OUT_SIZE, law_parameters
-from fmus.variables import ModuleError, Value, Variable, VariableTable, vector
+from fmus.module.variables import ModuleError, Value, Variable, VariableTable, vector
 
 SAMPLES = 8
 """Gauss points of a macro step, in time (see README)."""

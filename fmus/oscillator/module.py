@@ -12,8 +12,8 @@ import math
 
 import numpy as np
 
-from fmus.jit import kernel
-from fmus.variables import ModuleError, Variable, VariableTable
+from fmus.kernels.jit import kernel
+from fmus.module.variables import ModuleError, Variable, VariableTable
 
 TERMS = 18
 """Terms of the exponential series; with steps no longer than half the shortest time scale it is exact to round-off."""

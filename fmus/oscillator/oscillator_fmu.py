@@ -1,5 +1,5 @@
 """The FMU of the oscillator."""
 
-from fmus.recipe import FmuRecipe
+from fmus.module.recipe import FmuRecipe
 
 RECIPE = FmuRecipe("oscillator", "fmus.oscillator.module:Oscillator", "Mass between springs")

@@ -6,9 +6,9 @@ import math
 
 import numpy as np
 
+from fmus.kernels.rotations import follow_euler, from_euler, rotate
+from fmus.module.variables import ModuleError, Variable, VariableTable, vector
 from fmus.robot import rigid_body
-from fmus.rotations import follow_euler, from_euler, rotate
-from fmus.variables import ModuleError, Variable, VariableTable, vector
 
 ROUND_OFF = 1e-9
 """Relative; a macro step longer than a whole number of inner steps by less than this needs no further one."""

@@ -21,8 +21,8 @@ from __future__ import annotations
 
 import math
 
-from fmus.jit import kernel
-from fmus.rotations import follow_euler, normalize, quaternion_rate, rotate, rotate_back
+from fmus.kernels.jit import kernel
+from fmus.kernels.rotations import follow_euler, normalize, quaternion_rate, rotate, rotate_back
 
 MAX_WHEELS = 4
 RIGID = 21

@@ -2,8 +2,8 @@
 
 from collections.abc import Mapping
 
-from fmus.recipe import FmuRecipe
-from fmus.variables import Value
+from fmus.module.recipe import FmuRecipe
+from fmus.module.variables import Value
 
 
 def robot_recipe(name: str, n_wheels: int, start: Mapping[str, Value], description: str) -> FmuRecipe:

@@ -17,9 +17,10 @@ from fmpy.fmi3 import FMU3Model, FMU3ScheduledExecution, FMU3Slave
 from pythonfmu import FmuBuilder
 from scipy.linalg import expm
 
-from orchestrator.fmu import Fmu
-from orchestrator.graph import Connection, Graph
-from orchestrator.sub_steps import instance
+from orchestrator.coupling.fmu.instance import Fmu
+from orchestrator.coupling.fmu.sub_steps import instance
+from orchestrator.coupling.graph.graph import Graph
+from orchestrator.coupling.graph.links import Connection
 
 SCRIPTS = Path(__file__).resolve().parent
 OPTIONS = {"canGetAndSetFMUstate": True, "canSerializeFMUstate": True, "needsExecutionTool": False}

@@ -7,7 +7,7 @@ import numpy as np
 from fmus.cable.assembly import Model, add_load, interpolate
 from fmus.cable.module import Cable
 from fmus.cable.statics import equilibrium, mesh_model
-from fmus.variables import Value
+from fmus.module.variables import Value
 from verification.cable.beam import Beam
 
 Settings = dict[str, Value]

@@ -15,8 +15,8 @@ import matplotlib.pyplot as plt
 import numpy as np
 
 from fmus.cable.module import Cable
-from fmus.variables import Value
-from orchestrator.plots import COLOURS, STYLE
+from fmus.module.variables import Value
+from orchestrator.report.plots import COLOURS, STYLE
 from verification.cable.setups import ROBOT_WEIGHT, TABLE1, Settings, cable, loaded_equilibrium, point
 from verification.cable.taut import SETTINGS as TAUT
 from verification.cable.taut import taut

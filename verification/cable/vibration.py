@@ -16,7 +16,8 @@ from pathlib import Path
 import numpy as np
 from scipy.optimize import root_scalar
 
-from orchestrator.modes import CableModes, draw, modes
+from orchestrator.landing.modes import CableModes, modes
+from orchestrator.report.modes import draw
 from verification.cable import beam as reference
 from verification.cable.setups import PHYSICAL, RIG, TABLE1, Settings, beam, cable
 from verification.study import Result, Row, observed_order

@@ -24,13 +24,15 @@ from matplotlib.axes import Axes
 from matplotlib.ticker import LogLocator, NullLocator
 from scipy.linalg import expm
 
-from orchestrator import experiment
-from orchestrator.compare import CONSTANT, signal_errors
-from orchestrator.estimate import RATIOS
-from orchestrator.experiment import Coupled
-from orchestrator.plots import BLUE, COLOURS, GREY, MARKERS, STYLE, VERMILION
-from orchestrator.results import Table
-from orchestrator.scenario import Scenario, load
+from orchestrator.coupling.run.compare import signal_errors
+from orchestrator.coupling.run.results import Table
+from orchestrator.report.plots import BLUE, COLOURS, GREY, MARKERS, STYLE, VERMILION
+from orchestrator.runs.compare import CONSTANT
+from orchestrator.runs.coupled import run_coupled
+from orchestrator.runs.estimate import RATIOS, estimate_error
+from orchestrator.runs.record import Coupled
+from orchestrator.scenario.read import load
+from orchestrator.scenario.types import Scenario
 from verification.coupling.landings import FOLDER, LANDINGS, OTHERS, scenario, truth
 from verification.study import Result, Row
 
@@ -113,7 +115,7 @@ def measured() -> Found:
     """Run the grid, with both estimates of every run."""
     found = Found()
     for group, place, one in runs():
-        run = experiment.run(one)
+        run = run_coupled(one)
         table, own = true_solution(place, run)
         errors = signal_errors(run.table, table)
         ratios, costs = both_estimates(run)
@@ -141,7 +143,7 @@ def both_estimates(run: Coupled) -> tuple[dict[str, dict[str, float]], dict[str,
     errors, costs = {}, {}
     for kind in RATIOS:
         copy = replace(run, scenario=run.scenario.changed(estimate=kind))
-        other = experiment.estimate(copy)
+        other = estimate_error(copy)
         errors[kind] = copy.estimated_error
         costs[kind] = _solves(other) / _solves(run) if other else float("nan")
     return errors, costs

@@ -6,12 +6,15 @@ from functools import cache
 from pathlib import Path
 from typing import NamedTuple
 
-from orchestrator import experiment
-from orchestrator.compare import Reference, communication_times
-from orchestrator.experiment import Coupled
-from orchestrator.landing import problem
-from orchestrator.monolithic.solve import Solution, solve
-from orchestrator.scenario import Scenario, load
+from orchestrator.coupling.run.compare import communication_times
+from orchestrator.landing.build import problem
+from orchestrator.landing.monolithic.solve import Solution, solve
+from orchestrator.runs.compare import Reference
+from orchestrator.runs.coupled import run_coupled
+from orchestrator.runs.record import Coupled
+from orchestrator.runs.reference import solve_reference
+from orchestrator.scenario.read import load
+from orchestrator.scenario.types import Scenario
 
 FOLDER = Path(__file__).resolve().parents[2] / "scenarios"
 
@@ -60,7 +63,7 @@ def scenario(landing: str, master: str | None = None, macro_step: float | None =
 @cache
 def reference(landing: str, macro_steps: tuple[float, ...]) -> Reference:
     """Return the monolithic solution at the communication points of all `macro_steps`."""
-    return experiment.reference(scenario(landing), macro_steps)
+    return solve_reference(scenario(landing), macro_steps)
 
 
 @cache
@@ -72,4 +75,4 @@ def truth(landing: str, macro_steps: tuple[float, ...]) -> Solution:
 
 def coupled(landing: str, master: str, macro_step: float) -> Coupled:
     """Return a finished run."""
-    return experiment.run(scenario(landing, master, macro_step))
+    return run_coupled(scenario(landing, master, macro_step))

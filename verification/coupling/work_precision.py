@@ -12,10 +12,9 @@ from pathlib import Path
 
 import numpy as np
 
-from orchestrator import experiment
-from orchestrator.compare import Comparison
-from orchestrator.experiment import Coupled
-from orchestrator.plots import work_precision
+from orchestrator.report.plots import work_precision
+from orchestrator.runs.compare import Comparison, held_against
+from orchestrator.runs.record import Coupled
 from verification.coupling.landings import SIGNALS, coupled, reference
 from verification.study import Result, Row
 
@@ -41,7 +40,7 @@ def comparison() -> Comparison:
     """Run all masters at their macro steps."""
     true = reference(LANDING, tuple(sorted({step for steps in STEPS.values() for step in steps})))
     runs = [coupled(LANDING, master, step) for master, steps in STEPS.items() for step in steps]
-    held = [experiment.held_against(run, true) for run in runs if _finished(run)]
+    held = [held_against(run, true) for run in runs if _finished(run)]
     held = [run for run in held if all(run.signals[name].relative_max_error < 1.0 for name in SIGNALS)]
     return Comparison(true, held, dict(runs[0].scenario.simulation.tolerances))
 

@@ -10,7 +10,7 @@ from __future__ import annotations
 
 from pathlib import Path
 
-from orchestrator.experiment import reference
+from orchestrator.runs.reference import reference
 from verification.exchange.landing import balance, coupled, impulse, relative_error, scenario
 from verification.study import Result, Row
 

@@ -7,10 +7,13 @@ from pathlib import Path
 import numpy as np
 from scipy.spatial.transform import Rotation
 
-from orchestrator import landing
-from orchestrator.experiment import Coupled, run
-from orchestrator.results import Table
-from orchestrator.scenario import Scenario, load
+from orchestrator.coupling.run.results import Table
+from orchestrator.landing import build as landing
+from orchestrator.landing.fields import interface_balance
+from orchestrator.runs.coupled import run
+from orchestrator.runs.record import Coupled
+from orchestrator.scenario.read import load
+from orchestrator.scenario.types import Scenario
 
 SCENARIOS = Path(__file__).resolve().parents[2] / "scenarios"
 AXES = "xyz"
@@ -31,7 +34,7 @@ def coupled(made: Scenario, macro_step: float) -> Coupled:
 
 def balance(result: Coupled) -> float:
     """Return the largest energy residual of the first contact by the energy exchanged."""
-    return landing.interface_balance(result.table, result.log.energy)["contact1"]["relative"]
+    return interface_balance(result.table, result.log.energy)["contact1"]["relative"]
 
 
 def relative_error(signal: str, result: Table, reference: Table) -> float:

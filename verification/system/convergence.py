@@ -10,7 +10,7 @@ from __future__ import annotations
 
 from pathlib import Path
 
-from orchestrator import experiment
+from orchestrator.runs.coupled import run_coupled
 from verification.study import Result, Row
 from verification.system.setups import monolithic, relative_error, scenario
 
@@ -43,7 +43,7 @@ def run(figures: Path) -> Result:
     solver = {t: line(f"tolerance {t:g} m", monolithic(scenario(stop=STOP), t), exact, "1e-11 m") for t in (1e-8, 1e-9)}
     coupled = {}
     for step in (0.01, 0.005, 0.0025):
-        found = experiment.run(scenario(stop=STOP, **{"simulation.macro_step": step}))
+        found = run_coupled(scenario(stop=STOP, **{"simulation.macro_step": step}))
         rows = {name: values[:: round(0.01 / step)] for name, values in found.table.items()}
         truth = {name: values[::2] for name, values in exact.items()}
         coupled[step] = line(f"macro step {1e3 * step:g} ms, coupled", rows, truth, "monolithic, 1e-11 m")

@@ -10,7 +10,9 @@ from __future__ import annotations
 
 from pathlib import Path
 
-from orchestrator import audit, experiment, plots
+from orchestrator.landing import audit
+from orchestrator.report import plots
+from orchestrator.runs.coupled import run_coupled
 from verification.study import Result, Row
 from verification.system.setups import FLAGSHIP, estimated, scenario
 
@@ -23,7 +25,7 @@ def run(figures: Path) -> Result:
     rows = []
     for name, (stop, allowed) in CASES.items():
         one = scenario(name, stop)
-        coupled, solution = experiment.run(one).energy, estimated(one)
+        coupled, solution = run_coupled(one).energy, estimated(one)
         assert coupled is not None
         reference = audit.of_monolithic({"time": solution.time} | solution.signals, solution.estimated_error)
         assert reference is not None

@@ -12,8 +12,8 @@ from pathlib import Path
 
 import numpy as np
 
-from orchestrator import experiment
-from orchestrator.results import Table
+from orchestrator.coupling.run.results import Table
+from orchestrator.runs.coupled import run_coupled
 from verification.study import Result, Row
 from verification.system.setups import monolithic, scenario, times
 
@@ -29,7 +29,7 @@ def _mean(table: Table, time: np.ndarray, start: float, end: float) -> float:
 
 def run(figures: Path) -> Result:
     one = scenario("rig_10m_inclined", 60.0)
-    coupled, reference = experiment.run(one).table, monolithic(one)
+    coupled, reference = run_coupled(one).table, monolithic(one)
     rows = []
     for kind, table, time in (("coupled", coupled, coupled["time"]), ("monolithic", reference, times(one))):
         creep = abs(_mean(table, time, 50.0, 60.0) - _mean(table, time, 40.0, 50.0)) / 10.0

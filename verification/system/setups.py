@@ -6,10 +6,11 @@ from pathlib import Path
 
 import numpy as np
 
-from orchestrator import landing
-from orchestrator.monolithic.solve import Solution, integrate, solve
-from orchestrator.results import Table
-from orchestrator.scenario import Scenario, load
+from orchestrator.coupling.run.results import Table
+from orchestrator.landing import build as landing
+from orchestrator.landing.monolithic.solve import Solution, integrate, solve
+from orchestrator.scenario.read import load
+from orchestrator.scenario.types import Scenario
 
 SCENARIOS = Path(__file__).resolve().parent.parent.parent / "scenarios"
 FLAGSHIP = "landing_200m_point9"

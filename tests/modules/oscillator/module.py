@@ -10,8 +10,8 @@ import math
 
 import numpy as np
 
-from fmus.jit import kernel
-from fmus.variables import ModuleError, Variable, VariableTable
+from fmus.kernels.jit import kernel
+from fmus.module.variables import ModuleError, Variable, VariableTable
 
 
 @kernel

@@ -1,0 +1,1 @@
+"""The FMU face of a module (pythonfmu), and the build."""

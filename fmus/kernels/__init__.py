@@ -1,0 +1,1 @@
+"""Kernels that modules share: compilation, banded matrices, rotations, time integration."""

@@ -1,0 +1,1 @@
+"""What a module is: its table of variables, its recipe."""

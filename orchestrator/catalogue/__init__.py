@@ -1,0 +1,1 @@
+"""What can be named in a scenario: modules, robots."""

@@ -1,0 +1,103 @@
+"""What can be named in a scenario: variables of modules and FMUs, masters and their options, robots."""
+
+from __future__ import annotations
+
+import zipfile
+from importlib import import_module
+from pathlib import Path
+from typing import Any
+
+from fmus.module.variables import Kind, Value, Variable
+from orchestrator.coupling.errors import InputError
+
+KINDS: dict[str, Kind] = {"Real": "real", "Float64": "real", "Float32": "real", "Boolean": "boolean"}
+KINDS |= {
+    "String": "string",
+    "Integer": "integer",
+    "Enumeration": "integer",
+    "Int32": "integer",
+    "Int64": "integer",
+}
+
+
+MODELS = {
+    "cable": ("fmus.cable.module", "Cable"),
+    "contact": ("fmus.contact.module", "Contact"),
+    "oscillator": ("fmus.oscillator.module", "Oscillator"),
+}
+"""Our modules with one table each: file and class."""
+
+
+def of_module(kind: str, robot: str | None = None) -> dict[str, Variable]:
+    """Return the variables of our own module by name, from its table.
+
+    Parameters
+    ----------
+    kind : one of `MODELS`, or ``robot``
+    robot : name of the catalogue; the number of its wheels decides which variables there are
+    """
+    if kind == "robot":
+        from orchestrator.catalogue.robot_spec import load_robot
+
+        return robot_variables(load_robot(robot).n_wheels if robot in robots() else 1)
+    file, name = MODELS[kind]
+    return {v.name: v for v in getattr(import_module(file), name).table.variables}
+
+
+def robot_variables(n_wheels: int) -> dict[str, Variable]:
+    """Return the variables of our robot module with `n_wheels` wheels by name."""
+    from fmus.robot.module import robot_table
+
+    return {v.name: v for v in robot_table(n_wheels).variables}
+
+
+def of_fmu(path: Path) -> dict[str, Variable]:
+    """Return the variables of the FMU at `path` by name; raise `InputError` if it is none."""
+    from orchestrator.coupling.fmu.description import element_names
+
+    known: dict[str, Variable] = {}
+    for v in description(path).modelVariables:
+        parameter = v.causality == "parameter" or (v.causality == "local" and v.variability == "tunable")
+        kind = KINDS.get(v.type, "integer")
+        fixed = (
+            "parameter" if parameter else "input" if v.causality == "input" else "output",
+            v.unit or (v.declaredType.unit if v.declaredType else None) or "1",
+            _start(v.start, kind),
+            v.description or "",
+            kind,
+        )
+        known |= {name: Variable(name, *fixed) for name in element_names(v)}
+    return known
+
+
+def _start(text: str | None, kind: Kind) -> Value:
+    """Return a start value of a model description; an empty string if there is none, or an array's."""
+    if text is None or kind == "string":
+        return text or ""
+    if kind == "boolean":
+        return text in ("true", "1")
+    try:
+        return int(text) if kind == "integer" else float(text)
+    except ValueError:
+        return ""
+
+
+def description(path: Path) -> Any:
+    """Return FMPy's model description of the FMU at `path`; raise `InputError` if it is none."""
+    if not path.is_file():
+        raise InputError(f"{path}: no such file")
+    if not zipfile.is_zipfile(path):
+        raise InputError(f"{path}: not an FMU: not a zip archive")
+    from fmpy import read_model_description
+
+    try:
+        return read_model_description(str(path), validate=False)
+    except Exception as error:  # FMPy and lxml raise many kinds; each means the same to the user
+        raise InputError(f"{path}: not an FMU: its modelDescription.xml cannot be read: {error}") from None
+
+
+def robots() -> list[str]:
+    """Return the names of the robots of the catalogue."""
+    from orchestrator.catalogue.robot_spec import FOLDER
+
+    return sorted(path.stem for path in FOLDER.glob("*.toml"))

@@ -1,0 +1,1 @@
+"""One FMU: its description, its binding, an instance behind fast buffers."""

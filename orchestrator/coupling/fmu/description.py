@@ -1,0 +1,151 @@
+"""What a model description says: variables as ports, capabilities, the unzipped FMU."""
+
+from __future__ import annotations
+
+import contextlib
+import hashlib
+import os
+import re
+import tempfile
+import zipfile
+from dataclasses import dataclass
+from pathlib import Path
+from typing import Any, Literal
+from xml.etree import ElementTree
+
+import fmpy
+import numpy as np
+from fmpy.model_description import ModelDescription, ModelVariable
+
+KINDS: dict[str, str] = {
+    "Real": "real",
+    "Float64": "real",
+    "Float32": "real",
+    "Boolean": "boolean",
+    "String": "string",
+    "Binary": "binary",
+    "Clock": "clock",
+}
+Value = float | int | bool | str
+
+
+@dataclass(frozen=True)
+class Port:
+    """One scalar variable of an FMU; an array of FMI 3.0 is one port an element, ``name[1]``, ``name[2]`` …
+
+    `variable` is the name of the whole variable, `size` its number of elements, `element` counts them from 0.
+    """
+
+    name: str
+    vr: int
+    unit: str
+    kind: Literal["real", "integer", "boolean", "string", "binary", "clock"]
+    causality: str
+    variability: str
+    start: str | None
+    fmi_type: str
+    variable: str
+    size: int = 1
+    element: int = 0
+
+    @property
+    def is_number(self) -> bool:
+        """Whether it has a place among numbers."""
+        return self.kind in ("real", "integer", "boolean")
+
+
+@dataclass(frozen=True)
+class Capabilities:
+    """What the FMU says it can do; `internal_step`: its fixed internal step, s (FMI 3.0)."""
+
+    rollback: bool
+    serialize: bool
+    variable_step: bool
+    directional_derivatives: bool
+    internal_step: float | None = None
+
+
+def unzip_folder(sha256: str) -> Path:
+    """Return a plain ASCII folder for the FMU of this hash: loaders choke on others, and compiled code is
+    found again."""
+    for base in (Path.home() / ".cache", Path(tempfile.gettempdir())):
+        folder = base / "line-landing" / "fmu" / sha256[:16]
+        if re.fullmatch(r"[A-Za-z0-9_./\\:-]+", str(folder)):
+            with contextlib.suppress(OSError):
+                folder.parent.mkdir(parents=True, exist_ok=True)
+                if os.access(folder.parent, os.W_OK):
+                    return folder
+    raise OSError("no folder with a plain ASCII path can be written; set TMPDIR to one")
+
+
+def unzip(path: Path, sha256: str) -> Path:
+    """Unzip the FMU once; return the folder."""
+    folder = unzip_folder(sha256)
+    if not (folder / "modelDescription.xml").is_file():
+        with tempfile.TemporaryDirectory(dir=folder.parent) as scratch:
+            fmpy.extract(str(path), os.path.join(scratch, "fmu"))
+            with contextlib.suppress(OSError):  # another process was faster
+                os.rename(os.path.join(scratch, "fmu"), folder)
+    return folder
+
+
+def element_names(variable: ModelVariable) -> list[str]:
+    """Return the names of a variable's elements: ``x``, or ``x[1]``, ``x[2]`` …, or ``x[1,1]``, ``x[1,2]`` …"""
+    if not variable.shape:
+        return [variable.name]
+    places = np.ndindex(*variable.shape)
+    return [f"{variable.name}[{','.join(str(i + 1) for i in place)}]" for place in places]
+
+
+def ports_of(variable: ModelVariable) -> list[Port]:
+    kind: Any = KINDS.get(variable.type, "integer")
+    unit = variable.unit or (variable.declaredType.unit if variable.declaredType else None) or ""
+    size = int(np.prod(variable.shape)) if variable.shape else 1
+    names = element_names(variable)
+    fixed = (
+        unit,
+        kind,
+        variable.causality,
+        variable.variability,
+        variable.start,
+        variable.type,
+        variable.name,
+        size,
+    )
+    return [Port(name, variable.valueReference, *fixed, i) for i, name in enumerate(names)]
+
+
+def read_description(path: Path) -> tuple[ModelDescription, str]:
+    """Return model description and SHA-256 of an FMU; `ValueError` says what is wrong with it."""
+    if not path.is_file():
+        raise ValueError(f"{path}: no such file; build the FMUs, or correct the path")
+    sha256 = hashlib.sha256(path.read_bytes()).hexdigest()
+    try:
+        description = fmpy.read_model_description(str(path), validate=False)
+    except Exception as error:
+        raise ValueError(f"{path}: not an FMU ({error})") from error
+    if description.coSimulation is None:
+        raise ValueError(f"{path}: no co-simulation FMU; export it for co-simulation")
+    if str(description.fmiVersion).startswith("1"):
+        raise ValueError(f"{path}: FMI {description.fmiVersion} is not supported; export it for FMI 2.0 or 3.0")
+    if str(description.fmiVersion).startswith("3"):
+        description.coSimulation.providesDirectionalDerivative = _provides_derivatives(path)
+    return description, sha256
+
+
+def _provides_derivatives(path: Path) -> bool:
+    """Return what an FMI 3.0 description says; FMPy 0.3 looks for the attribute under its name in FMI 2.0."""
+    with zipfile.ZipFile(path) as archive, archive.open("modelDescription.xml") as file:
+        interface = ElementTree.parse(file).find("CoSimulation")
+    return interface is not None and interface.get("providesDirectionalDerivatives") in ("true", "1")
+
+
+def capabilities_of(description: ModelDescription) -> Capabilities:
+    interface: Any = description.coSimulation
+    return Capabilities(
+        rollback=bool(interface.canGetAndSetFMUstate),
+        serialize=bool(interface.canSerializeFMUstate),
+        variable_step=bool(interface.canHandleVariableCommunicationStepSize),
+        directional_derivatives=bool(interface.providesDirectionalDerivative),
+        internal_step=float(interface.fixedInternalStepSize) if interface.fixedInternalStepSize else None,
+    )

@@ -1,0 +1,386 @@
+"""One instance of an FMU behind fast buffers.
+
+Loading goes through FMPy; what happens in every macro step (get, set, step, save, restore) goes through
+reused buffers: 12 real values cost 2 µs to 3 µs. Failures of any kind leave as `FmuError`.
+"""
+
+from __future__ import annotations
+
+import atexit
+import contextlib
+import logging
+from collections.abc import Mapping, Sequence
+from ctypes import c_void_p
+from pathlib import Path
+from time import perf_counter
+from typing import Any
+
+import fmpy
+import numpy as np
+
+from orchestrator.coupling.errors import nearest
+from orchestrator.coupling.fmu.binding import DISCARD, ERROR, FATAL, LABELS, WARNING, Call, Fmi2, Fmi3, finalize_python
+from orchestrator.coupling.fmu.description import Port, Value, capabilities_of, ports_of, read_description, unzip
+
+logging.getLogger("fmus").addHandler(logging.NullHandler())  # what our FMUs say comes through FMI, like that of others
+
+NOT_FINITE, TIMEOUT = 5, 6
+SHORTER, FORWARD = "; a smaller macro step may help", "; take a master that never goes back, jacobi or gauss_seidel"
+CURES = {DISCARD: SHORTER, NOT_FINITE: SHORTER}
+State = c_void_p
+
+
+class FmuError(Exception):
+    """An FMU failed.
+
+    Attributes
+    ----------
+    component : name of the instance
+    time : s, start of the step that failed
+    status : 2 discard, 3 error, 4 fatal (FMI); 5 an output is not finite, 6 no answer in time
+    message : what happened, with the FMU's own last message
+    """
+
+    def __init__(self, component: str, time: float, status: int, message: str):
+        super().__init__(f"{component}, t = {time:.9g} s: {message}")
+        self.component, self.time, self.status, self.message = component, time, status, message
+
+    @property
+    def recoverable(self) -> bool:
+        """Whether a shorter step may help."""
+        return self.status in (DISCARD, NOT_FINITE)
+
+
+class _Block:
+    """Variables of one FMI type in a group; `pick` are their places in the group, (n,)."""
+
+    def __init__(self, fmu: Fmu, fmi_type: str, ports: list[Port], pick: np.ndarray, values: np.ndarray):
+        kind, dtype = fmu.fmi.TYPES[fmi_type]
+        firsts = dict.fromkeys((p.vr, p.size) for p in ports)
+        starts = np.cumsum([0, *(size for _, size in firsts)])
+        place = {vr: int(start) for (vr, _), start in zip(firsts, starts, strict=False)}
+        self.vr = np.array([vr for vr, _ in firsts], dtype=np.uint32)
+        self.elements = np.array([place[p.vr] + p.element for p in ports], dtype=np.intp)
+        self.pick, self.values = pick, values
+        direct = dtype is np.float64 and pick.size == values.size == int(starts[-1])
+        self.direct = direct and bool(np.all(pick == self.elements))
+        self.buffer = values if self.direct else np.zeros(int(starts[-1]), dtype=dtype)
+        self.partial = len(set(self.elements.tolist())) < int(starts[-1])
+        self.get_call: Call = fmu.fmi.accessor("Get", kind, self.vr, self.buffer)
+        self.set_call: Call = fmu.fmi.accessor("Set", kind, self.vr, self.buffer)
+
+    def get(self) -> int:
+        status = self.get_call()
+        if not self.direct:
+            self.values[self.pick] = self.buffer[self.elements]
+        return status
+
+    def set(self) -> int:
+        if self.partial:  # the other elements of the array stay as they are
+            self.get_call()
+        if not self.direct:
+            self.buffer[self.elements] = self.values[self.pick]
+        return self.set_call()
+
+
+class Group:
+    """Several variables of one FMU that are read or written together.
+
+    Attributes
+    ----------
+    values : (n,) float64; integers and Booleans are cast
+    """
+
+    __slots__ = ("_get", "_set", "fmu", "names", "ones", "runs", "values")
+
+    def __init__(self, fmu: Fmu, names: Sequence[str], values: np.ndarray | None = None):
+        self.fmu, self.names = fmu, tuple(names)
+        self.values = np.zeros(len(self.names)) if values is None else values
+        if self.values.shape != (len(self.names),) or not self.values.flags.c_contiguous:
+            raise ValueError(f"{fmu.name}: the buffer must be contiguous and hold {len(self.names)} numbers")
+        self.ones = np.ones(len(self.names))
+        ports = [fmu.port(name) for name in names]
+        types = dict.fromkeys(p.fmi_type for p in ports)
+        picks = {
+            kind: np.array([i for i, p in enumerate(ports) if p.fmi_type == kind], dtype=np.intp) for kind in types
+        }
+        for port in ports:
+            if not port.is_number:
+                raise ValueError(f"{fmu.name}: {port.name} is a {port.kind} and has no place among numbers")
+        self.runs = [_Block(fmu, kind, [ports[i] for i in pick], pick, self.values) for kind, pick in picks.items()]
+
+        # one direct run is the common case: its call is used as it is
+        direct = len(self.runs) == 1 and self.runs[0].direct
+        self._get: Call = self.runs[0].get_call if direct else self._get_runs
+        self._set: Call = self.runs[0].set_call if direct else self._set_runs
+
+    def _get_runs(self) -> int:
+        return max((run.get() for run in self.runs), default=0)
+
+    def _set_runs(self) -> int:
+        return max((run.set() for run in self.runs), default=0)
+
+    def get(self) -> None:
+        """Read all from the FMU into `values`."""
+        status = self._get()
+        if status > WARNING:
+            raise self.fmu.error(status, f"reading {self._span()}")
+
+    def set(self) -> None:
+        """Write all of `values` to the FMU."""
+        status = self._set()
+        if status > WARNING:
+            raise self.fmu.error(status, f"writing {self._span()}")
+
+    def get_finite(self) -> None:
+        """Read all; raise `FmuError` if a value is not finite."""
+        status = self._get()
+        if status > WARNING:
+            raise self.fmu.error(status, f"reading {self._span()}")
+        total = self.values.dot(self.ones)
+        if not -np.inf < total < np.inf:
+            self._name_not_finite()
+
+    def _span(self) -> str:
+        return self.names[0] if len(self.names) == 1 else f"{self.names[0]} … {self.names[-1]}"
+
+    def _name_not_finite(self) -> None:
+        bad = [name for name, value in zip(self.names, self.values, strict=True) if not np.isfinite(value)]
+        if bad:
+            more = f" and {len(bad) - 1} more" if len(bad) > 1 else ""
+            raise self.fmu.failure(NOT_FINITE, f"output {bad[0]}{more} is not a finite number")
+
+
+class Fmu:
+    """One instance of a co-simulation FMU (FMI 2.0 or 3.0).
+
+    Parameters
+    ----------
+    path : the ``.fmu`` file
+    name : instance name; the model's name if none is given
+
+    Attributes
+    ----------
+    ports : the variables by name
+    log : messages of the FMU
+    parameters : what `set_parameters` was given
+    solves, wall : steps made and the seconds spent in them
+    time : s, start of the last step
+    busy_since : clock at which the running call began, 0 when none runs
+    worst : highest FMI status that a call came back with, beyond warning
+    abandoned : a call of this run was given up and may still return: nothing of it may be touched any more
+    """
+
+    def __init__(self, path: str | Path, name: str | None = None):
+        self.path = Path(path)
+        self.description, self.sha256 = read_description(self.path)
+        self.name = name or str(self.description.modelName)
+        self.ports = {p.name: p for v in self.description.modelVariables for p in ports_of(v)}
+        self.capabilities = capabilities_of(self.description)
+        self.log: list[str] = []
+        self.parameters: dict[str, Value] = {}
+        self.solves, self.wall, self.time, self.busy_since = 0, 0.0, 0.0, 0.0
+        self.worst, self.initialized = 0, False
+        _require_possible(self)
+        self.abandoned = False
+        binding = Fmi3 if str(self.description.fmiVersion).startswith("3") else Fmi2
+        try:
+            with contextlib.chdir("."):  # FMPy stays in the library's folder if that cannot be loaded
+                self.fmi = binding(self.description, unzip(self.path, self.sha256), self.name, self._message)
+        except Exception as error:
+            hint = f" ({_gist(self.log[-1])})" if self.log else ""
+            raise ValueError(f"{self.path}: the FMU cannot be loaded: {error}{hint}") from error
+        _instances.append(self)
+
+    def _message(self, status: int, text: str) -> None:
+        label = LABELS[status] if 0 <= status < len(LABELS) else str(status)
+        self.log.append(f"[{label}] {text}")
+
+    def error(self, status: int, doing: str, cure: str = "") -> FmuError:
+        """Return the error for a call that came back with `status`."""
+        label = LABELS[status] if 0 <= status < len(LABELS) else f"unknown status {status}"
+        self.worst = max(self.worst, status)
+        known = status if DISCARD <= status <= FATAL else ERROR
+        return self.failure(known, f"{doing} came back with {label}", cure)
+
+    def failure(self, status: int, what: str, cure: str = "") -> FmuError:
+        """Return the error that says `what` happened, with the FMU's own last words and a cure."""
+        said = f"; the FMU says: {_gist(self.log[-1])}" if self.log else ""
+        return FmuError(self.name, self.time, status, what + said + (cure or CURES.get(status, "")))
+
+    def port(self, name: str) -> Port:
+        """Return the port; `ValueError` names the nearest one."""
+        if name not in self.ports:
+            raise ValueError(f"{self.name}: no variable {name}{nearest(name, self.ports)}")
+        return self.ports[name]
+
+    def set_parameters(self, values: Mapping[str, Value]) -> None:
+        """Set parameters (and start values of inputs) before initialisation.
+
+        Parameters
+        ----------
+        values : name → value; a Boolean for a Boolean, a word for a string, a number for the rest
+        """
+        for name, value in values.items():
+            port = self.port(name)
+            if port.causality not in ("parameter", "input", "structuralParameter"):
+                raise ValueError(f"{self.name}.{name} is no parameter: its causality is {port.causality}")
+            self._set_one(port, value)
+        self.parameters |= values
+
+    @property
+    def exchange(self) -> str:
+        """What the FMU assumes of the motion inside a step (`held`, `point`, …), empty if it has no such parameter."""
+        port = self.ports.get("exchange")
+        return "" if port is None else str(self.parameters.get("exchange", port.start or ""))
+
+    def twin(self) -> Fmu:
+        """Return a second instance with the same parameters, not initialised."""
+        twin = Fmu(self.path, self.name)
+        twin.set_parameters(self.parameters)
+        return twin
+
+    def _set_one(self, port: Port, value: Value) -> None:
+        if (port.kind == "string") != isinstance(value, str):
+            raise ValueError(f"{self.name}.{port.name} is of type {port.kind}; {value!r} does not fit")
+        if isinstance(value, str):
+            status = self.fmi.set_string(port.vr, value)
+            if status > WARNING:
+                raise self.error(status, f"setting {port.name}")
+            return
+        if not self._fits(port, value):
+            raise ValueError(f"{self.name}.{port.name} is of type {port.fmi_type}; {value!r} does not fit")
+        group = self.group([port.name])
+        group.values[0] = float(value)
+        group.set()
+
+    def _fits(self, port: Port, value: Value) -> bool:
+        """Return whether a number can be given to `port` as it is."""
+        if port.kind == "real":
+            return True
+        number = int(value)
+        limits = (0, 1) if port.kind == "boolean" else np.iinfo(self.fmi.TYPES[port.fmi_type][1])
+        low, high = limits if isinstance(limits, tuple) else (limits.min, limits.max)
+        return number == value == float(number) and low <= number <= high
+
+    def write(self, name: str, value: Value) -> None:
+        """Set one variable, of any type (slow)."""
+        self._set_one(self.port(name), value)
+
+    def read(self, name: str) -> Value:
+        """Return one variable, of any type (slow)."""
+        port = self.port(name)
+        if port.kind == "string":
+            return self.fmi.get_string(port.vr)
+        group = self.group([name])
+        group.get()
+        number = float(group.values[0])
+        return {"real": number, "integer": int(number), "boolean": bool(number)}[port.kind]
+
+    def group(self, names: Sequence[str], values: np.ndarray | None = None) -> Group:
+        """Return a handle on several variables; `values` (n,) is the buffer to use, if there is one
+        already."""
+        return Group(self, names, values)
+
+    def enter_initialization(self, start: float, stop: float | None = None) -> None:
+        """Set up the experiment and enter initialisation mode."""
+        self.time = start
+        self._call("initialisation", self.fmi.enter_initialization, start, stop)
+
+    def exit_initialization(self) -> None:
+        """Leave initialisation mode."""
+        self._call("end of initialisation", self.fmi.exit_initialization)
+        self.initialized = True
+
+    def _call(self, doing: str, function: Any, *arguments: Any) -> None:
+        self.busy_since = perf_counter()
+        status = function(*arguments)
+        self.busy_since = 0.0
+        if status > WARNING:
+            raise self.error(status, doing)
+
+    def step(self, t: float, h: float) -> None:
+        """Advance from `t` to `t + h` (s) with the inputs set before."""
+        self.time = t
+        self.solves += 1
+        self.busy_since = clock = perf_counter()
+        status = self.fmi.do_step(t, h)
+        self.wall += perf_counter() - clock
+        self.busy_since = 0.0
+        if status > WARNING:
+            raise self.error(status, f"the step of {h:.6g} s")
+
+    def allows(self, h: float, H: float) -> bool:
+        """Return whether steps `h` can be made where the master's own are `H`, s."""
+        internal = self.capabilities.internal_step
+        return self.capabilities.variable_step and not (internal and abs(h / internal - round(h / internal)) > 1e-6)
+
+    def save(self) -> State:
+        """Return a handle on the complete state; to be given to `release` in the end."""
+        state = c_void_p()
+        status = self.fmi.get_state(state)
+        if status > WARNING:
+            raise self.error(max(status, ERROR), "saving the state", FORWARD)
+        return state
+
+    def restore(self, state: State) -> None:
+        """Go back to a saved state (inputs too)."""
+        status = self.fmi.set_state(state)
+        if status > WARNING:
+            raise self.error(max(status, ERROR), "restoring the state", FORWARD)
+
+    def release(self, state: State) -> None:
+        """Free a saved state."""
+        self.fmi.free_state(state)
+
+    def close(self) -> None:
+        """End and free the instance, as far as FMI allows it; does nothing the second time."""
+        if self not in _instances or self.busy_since:  # a call that hangs in there would not let this one through
+            return
+        _instances.remove(self)
+        _libraries.append(self.fmi.slave.dll)
+        if self.initialized and self.worst < ERROR:
+            self.fmi.terminate()
+        if self.worst < FATAL:
+            self.fmi.free()
+
+
+def _gist(message: str) -> str:
+    """Return the line of a message that says what happened: the first, of a traceback the last."""
+    lines = [line for line in message.splitlines() if line.strip()] or [""]
+    return lines[-1] if "Traceback" in lines[0] else lines[0]
+
+
+def _require_possible(fmu: Fmu) -> None:
+    """Raise `ValueError` if the FMU cannot run here, or not once more."""
+    here = fmpy.platform_tuple if str(fmu.description.fmiVersion).startswith("3") else fmpy.platform
+    there = fmpy.supported_platforms(str(fmu.path))
+    if fmpy.platform not in there:
+        has = f"it has {', '.join(there)}" if there else "it has none at all"
+        raise ValueError(f"{fmu.path}: the FMU has no binary for {here} ({has}); export it for this platform")
+    interface: Any = fmu.description.coSimulation
+    if interface.canBeInstantiatedOnlyOncePerProcess and any(other.sha256 == fmu.sha256 for other in _instances):
+        raise ValueError(
+            f"{fmu.path}: can be instantiated only once per process, {fmu.name} would be the second; use a copy of "
+            "the model under another name"
+        )
+
+
+_instances: list[Fmu] = []
+_libraries: list[Any] = []
+
+
+def any_abandoned() -> bool:
+    """Return whether a call of any FMU was given up."""
+    return any(fmu.abandoned for fmu in _instances)
+
+
+@atexit.register
+def _close_all() -> None:
+    """Free what is left and end the interpreters that the libraries keep."""
+    if any_abandoned() or any(fmu.busy_since for fmu in _instances):
+        return  # a call still hangs in there: touching it would hang the exit too
+    for fmu in list(_instances):
+        fmu.close()
+    for library in {library._handle: library for library in _libraries}.values():
+        finalize_python(library)

@@ -1,0 +1,232 @@
+"""Interface-Jacobian Newton: the expensive components as linear maps over the step, the cheap ones as they
+are."""
+
+from __future__ import annotations
+
+from collections.abc import Callable
+from typing import Any, ClassVar
+
+import numpy as np
+
+from orchestrator.coupling.fmu.instance import FmuError, State
+from orchestrator.coupling.graph.graph import Graph, Node
+from orchestrator.coupling.graph.links import GraphError
+from orchestrator.coupling.stepping.implicit import Implicit
+from orchestrator.coupling.stepping.interpolation import Between, step_node
+from orchestrator.coupling.stepping.jacobian import OwnDerivatives
+from orchestrator.coupling.stepping.least_squares import LeastSquares
+from orchestrator.coupling.stepping.master import StepReport
+
+WORST = 1e-2  # contraction of the outer iteration that the exactness of the inner one reckons with at most
+SMALLEST = 1e-5  # relative difference of the unknowns below which it says nothing about the Jacobian
+
+
+class InterfaceJacobian(Implicit):
+    """Implicit; a linear model of the first components of the order, the others stepped inside an inner loop.
+
+    The components whose inputs are all torn (the *modelled* ones: for a landing cable and robot) answer to
+    their inputs x over a macro step by y(x), nearly linear with a Jacobian that hardly changes: y(x) ≈
+    y(x_k) + J (x - x_k). The rest (the contacts: stiff, nonlinear, cheap) are not approximated. Each outer
+    iteration steps the modelled components once and then solves x = S(y(x_k) + J (x - x_k)) for x, rolling
+    back and stepping the rest alone, by a quasi-Newton iteration whose columns are reused. J comes from
+    the FMU's directional derivatives where they foretell a step (`OwnDerivatives`), else from differences with
+    rollback, once for each length of step, and is corrected after every outer iteration (Broyden's update,
+    which meets the last difference); it is made anew only when convergence slows.
+
+    Order and stability: those of the exchange. When: the default for contact. Cost: about two steps of the
+    modelled components a macro step. Reference: Sicklinger et al., Int. J. Numer. Methods Eng. 98 (2014)
+    418-444 (IJCSA); Vierendeels et al., Computers & Structures 85 (2007) 970-976 (models of both sides).
+
+    Parameters
+    ----------
+    reuse : macro steps whose columns the inner iteration keeps
+    difference : step of the differences, relative to the magnitude of the unknown (at least 1 in its unit)
+    slow : outer iterations after which J is made anew
+    inner_tolerance : residual of the inner iteration, relative to `tolerance`
+    inner_iterations : at most
+    max_iterations : outer ones before the step is sub-divided; where the linear models fail, halves cost less, and an
+        iteration that wanders finds solutions far from where the motion comes from
+    options : those of `Implicit`
+    """
+
+    TITLE: ClassVar[str] = (
+        "implicit, Newton with a linear model of the expensive components, inner loop over the cheap ones"
+    )
+    NAME: ClassVar[str] = "interface_jacobian"
+
+    def __init__(
+        self,
+        graph: Graph,
+        *,
+        reuse: int = 8,
+        threshold: float = 1e-6,
+        relaxation: float = 0.1,
+        difference: float = 1e-2,
+        slow: int = 6,
+        inner_tolerance: float = 0.1,
+        inner_iterations: int = 30,
+        max_iterations: int = 10,
+        **options: Any,
+    ):
+        accelerator = LeastSquares(graph.torn.size, reuse, threshold, relaxation)
+        super().__init__(graph, accelerator, max_iterations=max_iterations, **options)
+        self.difference, self.slow = difference, slow
+        self.inner_tolerance, self.inner_iterations = inner_tolerance, inner_iterations
+        self.models = [Model(graph, node, self.between) for node in graph.nodes if not node.forward.size and node.torn]
+        modelled = {model.node.name for model in self.models}
+        self.rest = [(i, node) for i, node in enumerate(graph.nodes) if node.name not in modelled]
+        if not self.models or not self.rest:
+            raise GraphError(
+                f"master {self.NAME}: the graph has nothing to model or nothing to iterate over; use iqn_ils"
+            )
+
+    def start(self, t: float) -> None:
+        """Prepare for the first step."""
+        super().start(t)
+        for model in self.models:
+            model.jacobians.clear()
+        self.contraction = 0.0
+
+    def _begin(self, t: float, H: float, x: np.ndarray, states: list[State]) -> None:
+        super()._begin(t, H, x, states)
+        for model in self.models:
+            model.last = None
+            if H not in model.jacobians:
+                self._differentiate(model, t, H, x, states)
+        self.outer, self.last = 0, np.inf
+
+    def _differentiate(self, model: Model, t: float, H: float, x: np.ndarray, states: list[State]) -> None:
+        """Make the Jacobian of one component anew, and leave the component where it was."""
+        node, state = model.node, states[self.graph.nodes.index(model.node)]
+        values = x[model.unknowns]
+        steps = self.difference * np.maximum(np.abs(values), 1.0)
+
+        def respond(change: np.ndarray) -> np.ndarray:
+            return self._response(node, state, t, H, values + change)
+
+        base = respond(np.zeros_like(values))
+        # wrong by this much, J shrinks the error to `tolerance` within the `slow` iterations that it is given
+        jacobian = model.derivatives.jacobian(H, steps, respond, self.tolerance ** (1.0 / max(self.slow, 1)))
+        if jacobian is None:
+            jacobian = np.stack([(respond(e) - base) for e in np.diag(steps)], axis=1) / steps
+        node.fmu.restore(state)
+        model.jacobians[H] = jacobian
+
+    def _response(self, node: Node, state: State, t: float, H: float, values: np.ndarray) -> np.ndarray:
+        node.fmu.restore(state)
+        node.inputs.values[:] = values
+        step_node(self.between, node, t, H)
+        return node.outputs.values.copy()
+
+    def _correct(self, t: float, H: float, x: np.ndarray, r: np.ndarray, states: list[State]) -> np.ndarray:
+        """Update the models with what has just been seen, then solve the interface equation with them."""
+        for model in self.models:
+            model.learn(H, x, self.scale.values)
+        self.outer += 1
+        residual = self.scale.norm(r, x, H)
+        if self.last < np.inf:
+            self.contraction = 0.5 * (self.contraction + min(residual / self.last, WORST))
+        self.last = residual
+        if self.outer == self.slow:
+            for model in self.models:
+                self._differentiate(model, t, H, x, states)
+        return self._solve_interface(t, H, x, r, residual, states)[0]
+
+    def trial(
+        self, t: float, H: float, x: np.ndarray, tolerance: float, enough: Callable[[], bool], report: StepReport
+    ) -> bool:
+        """Make one step from the unknowns `x` (n,) on, for its outputs alone: one solve and the rest by the models; a
+        second solve, from which they learn, if that is not `enough`."""
+        self.graph.exchange_discrete()
+        states = self.graph.save()
+        self.between.begin()
+        self._begin(t, H, x, states)
+        try:
+            solved = False
+            for again in (False, True):
+                r = self._residual(t, H, x, states if again else None, report)
+                if r is None:
+                    return False
+                for model in self.models:
+                    model.learn(H, x, self.scale.values)
+                x, solved = self._solve_interface(t, H, x, r, self.scale.norm(r, x, H), states)
+                if solved and enough():
+                    break
+            return solved
+        finally:
+            self.graph.release(states)
+
+    def _solve_interface(
+        self, t: float, H: float, x: np.ndarray, r: np.ndarray, residual: float, states: list[State]
+    ) -> tuple[np.ndarray, bool]:
+        """Return the unknowns that meet the equation with the models, the best that were found, and whether they do;
+        `residual` is the norm of `r`."""
+        inner, best = self.accelerator, (np.inf, x)
+        inner.begin(H, self.scale.values)
+        # the models leave about `contraction` of the residual: to solve more exactly than they are is of no use
+        target = self.inner_tolerance * max(self.tolerance, self.contraction * residual)
+        for _ in range(self.inner_iterations):
+            if residual < best[0]:
+                best = (residual, x + r)
+            if residual <= target:
+                inner.accept()
+                return x, True
+            x = inner.propose(x, r)
+            try:
+                r = self._rest_residual(t, H, x, states)
+            except FmuError as error:
+                if not error.recoverable:
+                    raise
+                break
+            residual = self.scale.norm(r, x, H)
+        inner.reject()
+        return best[1], False
+
+    def _rest_residual(self, t: float, H: float, x: np.ndarray, states: list[State]) -> np.ndarray:
+        """Return S(x) - x with the modelled components replaced by their models."""
+        graph = self.graph
+        graph.u[self.places] = x
+        for model in self.models:
+            model.predict(H, x)
+        for i, node in self.rest:
+            node.fmu.restore(states[i])
+            node.receive(graph.y)
+            step_node(self.between, node, t, H)
+        return graph.gathered(self.places) - x
+
+
+class Model:
+    """Linear model y(x) of one component over a step, about the last point where it was stepped.
+
+    Attributes
+    ----------
+    unknowns : (m,) places of the component's inputs among the unknowns
+    derivatives : what the FMU says of its Jacobian
+    jacobians : length of step → (n_outputs, m)
+    last : unknowns (m,) and outputs (n_outputs,) of the last step made
+    """
+
+    def __init__(self, graph: Graph, node: Node, between: Between):
+        self.node = node
+        self.derivatives = OwnDerivatives(graph, between, node)
+        first = int(np.searchsorted(graph.torn, node.first))
+        self.unknowns = slice(first, first + node.torn)
+        self.jacobians: dict[float, np.ndarray] = {}
+        self.last: tuple[np.ndarray, np.ndarray] | None = None
+
+    def learn(self, H: float, x: np.ndarray, scale: np.ndarray) -> None:
+        """Take over the step just made, at the unknowns `x` (n,): Broyden's update with the difference to
+        the last."""
+        values, outputs = x[self.unknowns].copy(), self.node.outputs.values.copy()
+        if self.last is not None:
+            dx, dy = values - self.last[0], outputs - self.last[1]
+            weights = dx / scale[self.unknowns] ** 2
+            square = weights @ dx
+            if square > SMALLEST**2:
+                self.jacobians[H] += np.outer(dy - self.jacobians[H] @ dx, weights / square)
+        self.last = values, outputs
+
+    def predict(self, H: float, x: np.ndarray) -> None:
+        """Write the outputs that the model expects at the unknowns `x` (n,) into the graph."""
+        assert self.last is not None
+        self.node.outputs.values[:] = self.last[1] + self.jacobians[H] @ (x[self.unknowns] - self.last[0])

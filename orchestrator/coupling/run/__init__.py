@@ -1,0 +1,1 @@
+"""Running a master over a graph, and what is kept of it."""

@@ -1,0 +1,44 @@
+"""Ctrl-C: ends a run at a communication point, so that its results so far are kept."""
+
+from __future__ import annotations
+
+import signal
+from collections.abc import Callable, Iterator
+from contextlib import contextmanager
+from typing import Any
+
+from orchestrator.coupling.fmu.instance import FmuError
+
+
+class Interruption(FmuError):
+    """Ctrl-C: ends a run at a communication point, so that its results so far are kept."""
+
+    def __init__(self, time: float):
+        super().__init__("run", time, 0, "interrupted")
+
+    def __str__(self) -> str:
+        return f"interrupted at t = {self.time:g} s"
+
+
+@contextmanager
+def interruptible() -> Iterator[Callable[[float], None]]:
+    """Give what a run calls at each communication point; it raises `Interruption` after Ctrl-C.
+
+    A second Ctrl-C ends the program at once.
+    """
+    asked: list[int] = []
+    before = signal.getsignal(signal.SIGINT)
+
+    def ask(number: int, _: Any) -> None:
+        asked.append(number)
+        signal.signal(signal.SIGINT, before)
+
+    def check(time: float) -> None:
+        if asked:
+            raise Interruption(time)
+
+    signal.signal(signal.SIGINT, ask)
+    try:
+        yield check
+    finally:
+        signal.signal(signal.SIGINT, before)

@@ -1,0 +1,110 @@
+"""What a run leaves behind, and what reads it from the FMUs."""
+
+from __future__ import annotations
+
+from collections.abc import Sequence
+from dataclasses import dataclass, field
+
+import numpy as np
+
+from orchestrator.coupling.errors import nearest
+from orchestrator.coupling.fmu.instance import FmuError, Group
+from orchestrator.coupling.graph.graph import Graph
+from orchestrator.coupling.stepping.master import StepReport
+
+
+@dataclass
+class Log:
+    """What a run leaves behind.
+
+    Attributes
+    ----------
+    time : (n + 1,) s, communication points, the start included
+    signals, values : names, and (n + 1, len(signals))
+    steps : n reports
+    wall, wall_first : s, the loop without its first step; that step, with all it compiles
+    wall_components, solves : seconds inside each FMU's steps and their number, both without the first macro
+        step
+    energy : load → work done on the component through it, accumulated, (n + 1,) J
+    energy_residual : load → that work less what the component at its other end has booked, accumulated, (n + 1,) J; see
+        `Work`
+    error : None if the run came to its end
+    """
+
+    master: str
+    macro_step: float
+    signals: list[str]
+    time: np.ndarray
+    values: np.ndarray
+    steps: list[StepReport] = field(default_factory=list)
+    wall: float = 0.0
+    wall_first: float = 0.0
+    wall_components: dict[str, float] = field(default_factory=dict)
+    solves: dict[str, int] = field(default_factory=dict)
+    energy: dict[str, np.ndarray] = field(default_factory=dict)
+    energy_residual: dict[str, np.ndarray] = field(default_factory=dict)
+    error: FmuError | None = None
+
+    def signal(self, name: str) -> np.ndarray:
+        """Return one signal over time, (n + 1,)."""
+        return self.values[:, self.signals.index(name)]
+
+    @property
+    def power_residual(self) -> dict[str, np.ndarray]:
+        """Load → difference of the powers on both sides of the interface in each macro step, (n,) W."""
+        with np.errstate(over="ignore", invalid="ignore"):  # of a run that has diverged
+            return {name: np.diff(values) / self.macro_step for name, values in self.energy_residual.items()}
+
+    @property
+    def unconverged(self) -> int:
+        """Number of macro steps that did not reach the tolerance."""
+        return sum(not step.converged for step in self.steps)
+
+    @property
+    def iterations_per_step(self) -> float:
+        """Average number of iterations of a macro step."""
+        return sum(step.iterations for step in self.steps) / max(len(self.steps), 1)
+
+
+class Recorder:
+    """Reads the signals of a log from the FMUs, one call an FMU and type.
+
+    Parameters
+    ----------
+    record : signals ``component.variable``; None: every output that is a number
+    """
+
+    def __init__(self, graph: Graph, record: Sequence[str] | None):
+        self.signals = _all_outputs(graph) if record is None else list(record)
+        owners = [signal.partition(".")[0] for signal in self.signals]
+        self.row = np.zeros(len(self.signals))
+        self.groups: list[tuple[Group, np.ndarray | None]] = []
+        for component, fmu in graph.components.items():
+            places = np.array([i for i, owner in enumerate(owners) if owner == component], dtype=np.intp)
+            if not places.size:
+                continue
+            names = [self.signals[i].partition(".")[2] for i in places]
+            if places[-1] - places[0] + 1 == places.size:  # neighbours: the FMU writes them where they belong
+                self.groups.append((fmu.group(names, self.row[places[0] : places[-1] + 1]), None))
+            else:
+                self.groups.append((fmu.group(names), places))
+        missing = [s for s, owner in zip(self.signals, owners, strict=True) if owner not in graph.components]
+        if missing:
+            raise ValueError(f"cannot record {missing[0]}: no such component{nearest(missing[0], graph.components)}")
+
+    def read(self, row: np.ndarray) -> None:
+        """Read all signals into `row` (len(signals),)."""
+        for group, places in self.groups:
+            group.get_finite()
+            if places is not None:
+                self.row[places] = group.values
+        row[:] = self.row
+
+
+def _all_outputs(graph: Graph) -> list[str]:
+    return [
+        f"{component}.{port.name}"
+        for component, fmu in graph.components.items()
+        for port in fmu.ports.values()
+        if port.causality == "output" and port.is_number
+    ]

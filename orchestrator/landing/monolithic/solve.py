@@ -1,0 +1,241 @@
+"""Drive the monolithic solver: step control, output, and an estimate of its own error."""
+
+from __future__ import annotations
+
+import time as clock
+from collections.abc import Callable, Sequence
+from dataclasses import dataclass, field
+
+import numpy as np
+
+from fmus.cable import dynamics
+from fmus.cable.module import Cable
+from fmus.contact.law import law_parameters
+from fmus.contact.module import Contact
+from fmus.kernels.rotations import follow_euler
+from fmus.kernels.time_integration import collocation
+from fmus.module.variables import ModuleError
+from fmus.robot import rigid_body
+from fmus.robot.module import Robot, body_parameters, initial_state
+from orchestrator.landing.monolithic import system as kernels
+from orchestrator.landing.monolithic.system import N_CONTACT, N_ROBOT, State, System
+
+LONGEST = 9.4e-4
+"""s; longest step at the default tolerance, it resolves the cable's waves (docs/verification.md)."""
+EVENT = 2.7e-5
+"""s; longest step at the default tolerance in which a contact may open, close, begin or cease to slide.
+
+What such a step gets wrong depends on where in it the event falls. For the estimate it shrinks faster than the other
+steps do, so that the coarser solution, whatever the chance, is the one that is wrong.
+"""
+TOLERANCE = 2e-10
+"""m, local error of the robot's position a step allowed by default: leaves 6e-9 of the flagship's range."""
+NEWTON = 1e-12
+
+
+@dataclass
+class Problem:
+    """Initialised modules that make one system; one contact a wheel, in the order of the wheels."""
+
+    cable: Cable
+    robot: Robot
+    contacts: list[Contact]
+
+
+@dataclass
+class Solution:
+    """Signals of a monolithic run at the output times.
+
+    Attributes
+    ----------
+    time : (n,) s
+    signals : ``component.variable`` → (n,); components are cable, robot, contact1 …
+    wall_s : wall time of the solution returned, warm
+    steps : number of steps
+    tolerance : local tolerance, m
+    estimated_error : signal → largest difference from the solution with steps twice as long, unit of the signal
+    """
+
+    time: np.ndarray
+    signals: dict[str, np.ndarray]
+    wall_s: float
+    steps: int
+    tolerance: float
+    estimated_error: dict[str, float] = field(default_factory=dict)
+
+
+class Integrator:
+    """The system's state and the steps that advance it.
+
+    Parameters
+    ----------
+    refinement : the intervals between output times are divided into at least so many steps, or a multiple of it
+    """
+
+    def __init__(self, problem: Problem, tolerance: float = TOLERANCE, refinement: int = 1):
+        self.problem = problem
+        cable, robot = problem.cable, problem.robot
+        self.method = collocation(cable["spectral_radius"])
+        n_wheels = len(problem.contacts)
+        prm = body_parameters(robot.values, robot.table)
+        contacts = np.stack([law_parameters(c.values, c.table) for c in problem.contacts])
+        self.system = System(cable.model, self.method, prm, contacts, _control(robot, n_wheels))
+        memory = np.zeros((n_wheels, N_CONTACT))
+        memory[:, kernels.S] = [c.values[c.table.index["initial.s"]] for c in problem.contacts]
+        start = initial_state(robot.values, robot.table)
+        self.state = State(cable.state.copy(), start, np.zeros((2, N_ROBOT)), memory, np.zeros(1))
+        self.work = dynamics.make_work(cable.model.weight.size, cable.state.size)
+        self.space = kernels.make_space(cable.model.weight.size, n_wheels)
+        self.refinement = refinement
+        self.longest = LONGEST * (tolerance / TOLERANCE) ** 0.25
+        event = EVENT * (tolerance / TOLERANCE) ** 0.5
+        self.control = np.array([0.02 * self.longest, self.longest, tolerance, event, NEWTON, 0.0, 0.0, 0.0, 0.0])
+        if kernels.settle(self.system, self.state, False, self.space, self.work) != kernels.OK:
+            raise ModuleError("monolithic: the contact law fails at the start; check the initial pose of the robot")
+
+    @property
+    def steps(self) -> int:
+        """Number of steps made."""
+        return int(self.control[kernels.STEPS])
+
+    def advance(self, t: float, end: float) -> None:
+        """Integrate from `t` to `end` with controlled steps; raises `ModuleError` if none is short enough."""
+        parts = self.refinement * max(1.0, np.ceil((end - t) / (self.refinement * self.longest) - 1e-9))
+        self.control[kernels.LONGEST] = (end - t) / parts
+        status, reached = kernels.advance(self.system, self.state, self.control, t, end, self.space, self.work)
+        if status == kernels.OFF_CABLE:
+            raise ModuleError(
+                f"monolithic: a wheel has run past a support, off the cable, at t = {reached:g} s; "
+                "stop the run earlier, or brake the robot"
+            )
+        if status != kernels.OK:
+            raise ModuleError(
+                f"monolithic: no step is short enough at t = {reached:g} s; check stiffness and damping of the contact"
+            )
+
+
+def _control(robot: Robot, n_wheels: int) -> np.ndarray:
+    """Return thrust, torque and drive torques, constant inputs of the robot, in the places of the kernels' loads."""
+    value = {name: float(robot.values[robot.table.index[name]]) for name in robot.table.names("input")}
+    loads = np.zeros(rigid_body.BODY_LOADS + rigid_body.WHEEL_LOADS * n_wheels)
+    loads[:4] = value["thrust"], value["torque.x"], value["torque.y"], value["torque.z"]
+    for k in range(n_wheels):
+        loads[rigid_body.BODY_LOADS + rigid_body.WHEEL_LOADS * k + 6] = value[f"wheel[{k + 1}].drive_torque"]
+    return loads
+
+
+class _Recorder:
+    """Writes the modules' own outputs at the output times."""
+
+    SKIP = ("_mean.", ".work", ".rotation", "_rate.")
+
+    def __init__(self, integrator: Integrator, n: int):
+        self.integrator = integrator
+        problem = integrator.problem
+        self.cable, self.robot = problem.cable, problem.robot
+        self.cable_names = self._names(self.cable.table.names("output"))
+        self.robot_names = self._names(self.robot.table.names("output"))
+        self.cable_at = self.cable.table.indices(self.cable_names)
+        self.robot_at = self.robot.table.indices(self.robot_names)
+        self.contact_names = (
+            "normal_force", "friction_force", "penetration", "slip_velocity", "contact_length", "status",
+            "dissipated_energy", "strain_energy", "cable.s",
+        )  # fmt: skip
+        n_wheels = len(problem.contacts)
+        self.cable_rows = np.zeros((n, len(self.cable_names)))
+        self.robot_rows = np.zeros((n, len(self.robot_names)))
+        self.contact_rows = np.zeros((n, n_wheels, len(self.contact_names)))
+        self._robot_state = self.robot.state.copy()
+        self._angles = self._robot_state[rigid_body.ANGLES : rigid_body.ANGLES + 3]
+
+    def _names(self, names: Sequence[str]) -> list[str]:
+        return [name for name in names if not any(part in name for part in self.SKIP)]
+
+    def record(self, i: int) -> None:
+        """Write row `i` from the present state."""
+        state, system, space = self.integrator.state, self.integrator.system, self.integrator.space
+        kernels.settle(system, state, False, space, self.integrator.work)
+        out = space.out[0]
+        for k in range(len(state.contacts)):
+            row, memory = out[k], state.contacts[k]
+            first = self.cable.table.index[f"port[{k + 1}].s"]
+            self.cable.values[first] = memory[kernels.S]
+            self.cable.values[first + 1 : first + 7] = 0.0 if memory[kernels.LEFT] else row[:6]
+            self.contact_rows[i, k] = (
+                row[12], np.hypot(row[13], row[14]), row[15], np.hypot(row[16], row[17]), row[18],
+                3.0 if memory[kernels.LEFT] else row[19], memory[kernels.WALLS] + memory[kernels.FRICTION],
+                row[25] + row[26], memory[kernels.S],
+            )  # fmt: skip
+        self.cable.state[:] = state.cable
+        self.cable.show()
+        self.cable_rows[i] = self.cable.values[self.cable_at]
+        self._robot_state[: rigid_body.RIGID] = state.robot
+        self._robot_state[rigid_body.CONTROL_WORK] = state.control_work[0]
+        follow_euler(state.robot[3:7], self._angles)
+        values = np.zeros(rigid_body.BODY_OUTPUTS + rigid_body.WHEEL_OUTPUTS * self.robot.n_wheels)
+        rigid_body.outputs(system.robot, self._robot_state, values)
+        self.robot_rows[i] = values[self.robot_at - len(self.robot.table) + values.size]
+
+    def signals(self) -> dict[str, np.ndarray]:
+        """Return every signal by name."""
+        found = {f"cable.{name}": self.cable_rows[:, j] for j, name in enumerate(self.cable_names)}
+        found |= {f"robot.{name}": self.robot_rows[:, j] for j, name in enumerate(self.robot_names)}
+        for k in range(self.contact_rows.shape[1]):
+            found |= {f"contact{k + 1}.{name}": self.contact_rows[:, k, j] for j, name in enumerate(self.contact_names)}
+        return found
+
+
+def integrate(
+    make: Callable[[], Problem],
+    times: np.ndarray,
+    tolerance: float = TOLERANCE,
+    progress: Callable[[float], None] | None = None,
+    refinement: int = 1,
+) -> Solution:
+    """Solve once.
+
+    Parameters
+    ----------
+    make : returns the initialised problem
+    times : (n,) ascending output times, s; the first one is the start
+    tolerance : local error of the robot's position allowed a step, m
+    progress : called with the time reached
+    refinement : see `Integrator`
+    """
+    integrator = Integrator(make(), tolerance, refinement)
+    recorder = _Recorder(integrator, len(times))
+    recorder.record(0)
+    integrator.advance(float(times[0]), float(times[0]))  # compiles, or loads what is compiled: not part of the cost
+    start = clock.perf_counter()
+    for i in range(1, len(times)):
+        integrator.advance(float(times[i - 1]), float(times[i]))
+        recorder.record(i)
+        if progress is not None:
+            progress(float(times[i]))
+    wall = clock.perf_counter() - start
+    return Solution(np.asarray(times), recorder.signals(), wall, integrator.steps, tolerance)
+
+
+def solve(
+    make: Callable[[], Problem],
+    times: np.ndarray,
+    tolerance: float = TOLERANCE,
+    estimate: bool = True,
+    progress: Callable[[float], None] | None = None,
+) -> Solution:
+    """Solve, and estimate the error by a second solution whose steps are twice as long.
+
+    The tolerance alone would not tell: where the cable's waves or the output times limit the steps, both solutions
+    would take the same ones. So the finer one divides every interval into an even number, of which the coarser one
+    takes half, at a tolerance 2⁴ times as wide (the local error is of fourth order). The estimate is the whole
+    difference of the two. With the order p of convergence the true error is 1/(2^p - 1) of it: a bound for p >= 1.
+    Parameters as in `integrate`.
+    """
+    fine = integrate(make, times, tolerance, progress, refinement=2)
+    if not estimate:
+        return fine
+    coarse = integrate(make, times, 16.0 * tolerance, progress)
+    fine.estimated_error = {
+        name: float(np.max(np.abs(values - coarse.signals[name]))) for name, values in fine.signals.items()
+    }
+    return fine

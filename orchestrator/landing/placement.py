@@ -1,0 +1,131 @@
+"""Where the robot starts: over its landing point, its wheels just touching the cable at rest, then lifted.
+
+The cable is looked at in the vertical plane through its supports, in which it hangs.
+"""
+
+from __future__ import annotations
+
+from dataclasses import dataclass
+
+import numpy as np
+from scipy.optimize import least_squares, root_scalar
+
+from fmus.cable.assembly import interpolate
+from fmus.cable.module import Cable
+from fmus.contact.law import PARAMETERS, law_parameters
+from fmus.contact.module import Contact
+from fmus.kernels.rotations import from_euler, rotate
+from fmus.module.variables import ModuleError
+from fmus.robot.module import Robot
+
+
+@dataclass(frozen=True)
+class Placement:
+    """Where the robot starts: its ``initial.*`` parameters, and the arc length under each wheel."""
+
+    initial: dict[str, float]
+    arc_lengths: list[float]
+
+
+def touching_distance(contact: Contact) -> float:
+    """Return the distance (m) of wheel centre and centreline at which both walls touch: R_b + d_c / (2 sin(θ/2))."""
+    prm = law_parameters(contact.values, contact.table)
+    sine, apex = prm[-3], prm[-1]
+    return float(apex + 0.5 * prm[PARAMETERS.index("cable_diameter")] / sine)
+
+
+def place(
+    cable: Cable, robot: Robot, contact: Contact, position: float, height: float = 0.0, velocity: float = 0.0
+) -> Placement:
+    """Return the start of the robot over the cable at rest.
+
+    Parameters
+    ----------
+    position : horizontal distance of the landing point (middle of the wheels) from the left support, m
+    height : lift above touching, m
+    velocity : sinking speed at the start, m/s
+
+    Roll is turned so that all wheels touch where there are several; other angles, and the roll of a robot with one
+    wheel, are its parameters ``initial.*``.
+
+    Raises
+    ------
+    ModuleError : the landing point is off the span
+    """
+    span = cable["span"]
+    if not 0.0 < position < span:
+        raise ModuleError(f"landing.position = {position:g} m is off the span; choose one between 0 and {span:g} m")
+    names = [f"initial.{a}" for a in ("roll", "pitch", "yaw")]
+    angles = np.array([robot.values[robot.table.index[n]] for n in names])
+    mounts = np.array([_mount(robot, k) for k in range(robot.n_wheels)])
+    distance = touching_distance(contact)
+
+    def centres(unknown: np.ndarray) -> np.ndarray:
+        q = np.zeros(4)
+        from_euler(angles[0] + unknown[2], angles[1], angles[2], q)
+        arms = np.array([rotate(q, *mount) for mount in mounts])
+        return np.array([0.0, unknown[0], unknown[1]]) + arms
+
+    def misfit(unknown: np.ndarray) -> np.ndarray:
+        feet = [_foot(cable, centre) for centre in centres(unknown)]
+        gaps = [foot[1] - distance for foot in feet]
+        middle = np.mean([foot[2] for foot in feet]) - position
+        free_roll = [0.0] if robot.n_wheels > 1 else [unknown[2]]
+        return np.array([*gaps, middle, *free_roll])
+
+    start = np.array([position, _height(cable, position) + distance - np.mean(mounts[:, 2]), 0.0])
+    found = least_squares(misfit, start, xtol=1e-15, ftol=1e-15, gtol=1e-15, x_scale=[1.0, 1.0, 0.1]).x
+    if robot.n_wheels > 2:  # roll and height cannot make all of them touch: no wheel may start pressed in
+        found[1] -= min(_foot(cable, centre)[1] - distance for centre in centres(found))
+    feet = [_foot(cable, centre) for centre in centres(found)]
+    lateral = float(np.mean(centres(found)[:, 0]))
+    initial = {
+        "initial.position.x": -lateral,
+        "initial.position.y": float(found[0]),
+        "initial.position.z": float(found[1] + height),
+        "initial.velocity.z": -velocity,
+        "initial.roll": float(angles[0] + found[2]),
+    }
+    return Placement(initial, [foot[0] for foot in feet])
+
+
+def _mount(robot: Robot, k: int) -> np.ndarray:
+    return robot.values[robot.table.indices(f"wheel[{k + 1}].mount.{axis}" for axis in "xyz")]
+
+
+def _point(cable: Cable, s: float) -> np.ndarray:
+    """Return position and tangent (6,) of the cable at arc length `s`."""
+    out = np.zeros(6)
+    interpolate(cable.model, cable.state[: cable.model.weight.size], s, np.zeros(8), out)
+    return out
+
+
+def _height(cable: Cable, y: float) -> float:
+    """Return z of the cable over the horizontal position `y`."""
+    return float(_point(cable, arc_length_at(cable, y))[2])
+
+
+def arc_length_at(cable: Cable, y: float) -> float:
+    """Return the unstretched arc length at the horizontal position `y` of the cable at rest."""
+    length = float(cable.model.s[-1])
+    found = root_scalar(lambda s: _point(cable, s)[1] - y, bracket=(0.0, length), xtol=1e-12 * length)
+    return float(found.root)
+
+
+def _foot(cable: Cable, centre: np.ndarray) -> tuple[float, float, float]:
+    """Return arc length, distance (negative under the cable) and y of the cable's point nearest to `centre` (3,).
+
+    All in the plane of the cable, y and z.
+    """
+    s = arc_length_at(cable, float(np.clip(centre[1], 1e-6, cable["span"] - 1e-6)))
+    length = float(cable.model.s[-1])
+    for _ in range(20):
+        point = _point(cable, s)
+        ds = float((centre[1:] - point[1:3]) @ point[4:6] / (point[4:6] @ point[4:6]))
+        s = min(max(s + ds, 0.0), length)
+        if abs(ds) < 1e-13 * length:
+            break
+    point = _point(cable, s)
+    apart = centre[1:] - point[1:3]
+    side = np.sign(point[4] * apart[1] - point[5] * apart[0])
+    return s, float(side * np.hypot(*apart)), float(point[1])

@@ -1,0 +1,105 @@
+"""The graph of a landing: cable, robot, one contact a wheel, connected by the contract."""
+
+from __future__ import annotations
+
+from collections.abc import Iterator, Mapping
+from pathlib import Path
+
+from fmus.module.variables import Value
+from orchestrator.catalogue import library
+from orchestrator.coupling.errors import InputError
+from orchestrator.coupling.fmu.instance import Fmu
+from orchestrator.coupling.fmu.sub_steps import instance
+from orchestrator.coupling.graph.graph import Graph
+from orchestrator.coupling.graph.links import Connection
+from orchestrator.landing.build import parts, placed
+from orchestrator.scenario.types import Scenario
+
+INNER_STEPS = {"waveform": 4, "hermite": 4, "point": 1}
+"""Inner steps of our cable in a macro step, where the scenario gives no `integration_step`. The error that they leave
+shrinks with the macro step as that of the exchange does, and stays a tenth of it (docs/decisions.md)."""
+LONGEST_ADAPTIVE = 2.5e-3
+"""Longest such step, s, where the master's steps are adaptive: long macro steps are then wanted, and the local error does
+not tell that of the cable's inner steps (docs/masters.md)."""
+
+
+def landing_graph(scenario: Scenario, exchange: str) -> Graph:
+    """Return the graph of loaded FMUs: cable, robot, one contact a wheel, connected by the contract.
+
+    `waveform` becomes `hermite` where cable or robot does not give its means, `point` where one takes no slopes.
+    """
+    assert scenario.cable is not None and scenario.robot is not None
+    resolved, (_, placement) = parts(scenario), placed(scenario)
+    components: dict[str, Fmu] = {}
+    try:
+        components["cable"] = instance(scenario.cable.fmu or library.cable_fmu(), "cable", scenario.cable.steps)
+        components["cable"].set_parameters(_inner_step(scenario, exchange) | resolved.cable)
+        robot = library.robot_fmu(resolved.spec) if resolved.spec is not None else Path(str(scenario.robot.fmu))
+        components["robot"] = instance(robot, "robot", scenario.robot.steps)
+        initial = {n: v for n, v in placement.initial.items() if n in components["robot"].ports}
+        if not all(f"initial.position.{axis}" in initial for axis in "yz"):
+            raise InputError(f"{robot}: has no parameters initial.position.*: the robot cannot be placed")
+        components["robot"].set_parameters(dict(scenario.robot.parameters) | initial | scenario.robot.inputs)
+        exchange = _possible(exchange, components)
+        for k, s in enumerate(placement.arc_lengths, start=1):
+            contact = Fmu(scenario.contact.fmu or library.contact_fmu(), f"contact{k}")
+            components[f"contact{k}"] = contact
+            contact.set_parameters(resolved.contact | {"initial.s": s, "exchange": exchange})
+        return Graph(components, _connections(components, exchange), order=tuple(components))
+    except BaseException:
+        for fmu in components.values():
+            fmu.close()
+        raise
+
+
+def _inner_step(scenario: Scenario, exchange: str) -> dict[str, Value]:
+    """Return the longest inner step of our own cable."""
+    assert scenario.cable is not None
+    step = scenario.simulation.macro_step / INNER_STEPS[exchange]
+    if scenario.master.get("local_tolerance"):
+        step = min(step, LONGEST_ADAPTIVE)
+    return {"integration_step": step} if scenario.cable.fmu is None else {}
+
+
+def _possible(exchange: str, components: Mapping[str, Fmu]) -> str:
+    """Return `exchange`, or the best that cable and robot admit.
+
+    Without inputs for slopes only `point` is left: a mean force that is held feeds the contact's vibration.
+    """
+    cable, robot = components["cable"].ports, components["robot"].ports
+    if not ("port[1].force_rate.x" in cable and "wheel[1].force_rate.x" in robot):
+        return "point"
+    means = "port[1].position_mean.x" in cable and "wheel[1].rotation_mean.x" in robot
+    return "hermite" if exchange == "waveform" and not means else exchange
+
+
+def _connections(components: Mapping[str, Fmu], exchange: str) -> list[Connection]:
+    """Return all connections of the contract for which both sides have the variable.
+
+    `point` gives no slopes: left open, the masters set them by joining or extrapolating the forces of the ends.
+    """
+    found: list[Connection] = []
+    for name in components:
+        if not name.startswith("contact"):
+            continue
+        k = name.removeprefix("contact")
+        for side, partner in (("cable", f"cable.port[{k}]"), ("wheel", f"robot.wheel[{k}]")):
+            found += _links(components, f"{name}.{side}", partner)
+    slopes = ("force_rate.", "moment_rate.")
+    return [c for c in found if exchange != "point" or not any(slope in c.source for slope in slopes)]
+
+
+def _links(components: Mapping[str, Fmu], contact: str, partner: str) -> Iterator[Connection]:
+    """Yield the connections between one side of a contact and its partner, both ways."""
+    (name, side), (other, port) = contact.split(".", 1), partner.split(".", 1)
+    for full, variable in components[name].ports.items():
+        if not full.startswith(f"{side}."):
+            continue
+        there = port + full.removeprefix(side)
+        partner_port = components[other].ports.get(there)
+        if partner_port is None:
+            continue
+        if variable.causality == "input" and partner_port.causality == "output":
+            yield Connection(f"{other}.{there}", f"{name}.{full}")
+        elif variable.causality == "output" and partner_port.causality == "input":
+            yield Connection(f"{name}.{full}", f"{other}.{there}")

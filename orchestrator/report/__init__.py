@@ -1,0 +1,1 @@
+"""Pictures and pages, drawn from a run directory."""

@@ -1,0 +1,195 @@
+"""Scenario files: TOML, parsed once into types; the only place where dictionaries of settings live.
+
+A scenario is either a landing (``[cable]``, ``[robot]``, ``[contact]``, ``[landing]``) or a general graph of
+FMUs (``[components.NAME]`` and ``connections``). Every value may be bare or a table
+``{ value, source, reason, unit }`` that says where the number comes from.
+"""
+
+from __future__ import annotations
+
+from collections.abc import Mapping
+from dataclasses import dataclass
+from pathlib import Path
+from typing import Annotated, Any, Literal
+
+from pydantic import (
+    AfterValidator,
+    BaseModel,
+    ConfigDict,
+    Field,
+    PrivateAttr,
+    model_validator,
+)
+
+from orchestrator.catalogue import modules as vocabulary
+
+Scalar = bool | int | float | str
+
+DEFAULT_MASTER = "iqn_ils"
+
+
+class Section(BaseModel):
+    """A table of the scenario file: no unknown keys, no conversion between types, no NaN or infinity."""
+
+    model_config = ConfigDict(extra="forbid", strict=True, frozen=True, allow_inf_nan=False)
+
+
+def _scalar(value: Any) -> Scalar:
+    if not isinstance(value, Scalar):
+        raise ValueError("must be a number, true, false or a string")
+    return value
+
+
+Settings = dict[str, Annotated[Any, AfterValidator(_scalar)]]
+Positive = Annotated[float, Field(gt=0.0)]
+Count = Annotated[int, Field(ge=1)]
+NonNegative = Annotated[float, Field(ge=0.0)]
+
+
+class Simulation(Section):
+    """Times in s. `tolerances`: the largest `relative_max_error` that `compare` lets pass, by signal.
+
+    `estimate`: by which second run `run` estimates the error of those signals, if any (docs/estimate.md). `timeout`: wall
+    time that an FMU may take for one step or its initialisation; none: as long as it likes.
+    """
+
+    stop_time: Positive
+    macro_step: Positive
+    master: str = DEFAULT_MASTER
+    exchange: Literal["point", "hermite", "waveform"] | None = None
+    tolerances: dict[str, Positive] = {}
+    estimate: Literal["finer", "coarser", "none"] = "finer"
+    timeout: Positive | None = None
+
+
+class CableSection(Section):
+    """The cable: parameters by their names in the contract; `fmu` is a foreign one instead of ours.
+
+    `steps`, here and below: steps that the FMU makes in each step of the master (docs/masters.md).
+    """
+
+    fmu: str | None = None
+    stiffness_set: str = "unnamed"
+    steps: Count = 1
+    parameters: Settings = {}
+
+
+class RobotSection(Section):
+    """The robot: one of the catalogue (`model`) or any FMU that meets the contract (`fmu`).
+
+    `inputs` are held over the whole run: thrust, control torque, drive torques of the wheels.
+    """
+
+    model: str | None = None
+    fmu: str | None = None
+    steps: Count = 1
+    parameters: Settings = {}
+    inputs: Settings = {}
+
+    @model_validator(mode="after")
+    def _one_robot(self) -> RobotSection:
+        if (self.model is None) == (self.fmu is None):
+            raise ValueError('give either model = "NAME" (see `orchestrator list`) or fmu = "FILE.fmu"')
+        return self
+
+
+class ContactSection(Section):
+    """The wheel contact; one instance a wheel is made from it."""
+
+    fmu: str | None = None
+    parameters: Settings = {}
+
+
+class Landing(Section):
+    """Where and how the robot comes down.
+
+    Attributes
+    ----------
+    position : m along the span from the left support; the wheel, or the middle of the wheels, lands there
+    height : m above touching
+    velocity : m/s downwards
+    """
+
+    position: float
+    height: NonNegative = 0.0
+    velocity: NonNegative = 0.0
+
+
+class Component(Section):
+    """One FMU of a general graph: any (`fmu`), or one of our modules (`model`)."""
+
+    model: str | None = None
+    fmu: str | None = None
+    steps: Count = 1
+    parameters: Settings = {}
+    inputs: Settings = {}
+
+    @model_validator(mode="after")
+    def _one_source(self) -> Component:
+        if (self.model is None) == (self.fmu is None):
+            raise ValueError(f'give either fmu = "FILE.fmu" or model = one of {", ".join(vocabulary.MODELS)}')
+        return self
+
+
+@dataclass(frozen=True)
+class Provenance:
+    """Where a value comes from; `source` is ``assumed`` only together with a `reason`."""
+
+    source: str = "scenario"
+    reason: str = ""
+    unit: str | None = None
+
+
+class Scenario(Section):
+    """One scenario, checked; `provenance` tells where each value comes from, by its path."""
+
+    title: str
+    simulation: Simulation
+    master: Settings = {}
+    cable: CableSection | None = None
+    robot: RobotSection | None = None
+    contact: ContactSection = ContactSection()
+    landing: Landing | None = None
+    components: dict[str, Component] = {}
+    connections: list[str] = []
+    _path: Path = PrivateAttr(default=Path("scenario.toml"))
+    _provenance: dict[str, Provenance] = PrivateAttr(default_factory=dict)
+
+    @model_validator(mode="after")
+    def _one_kind(self) -> Scenario:
+        parts = {"cable": self.cable, "robot": self.robot, "landing": self.landing}
+        missing = [name for name, part in parts.items() if part is None]
+        if self.components and len(missing) < len(parts):
+            raise ValueError("has both components and a landing; give one of them")
+        if not self.components and missing:
+            raise ValueError(f"{', '.join(missing)}: missing; a landing needs cable, robot and landing")
+        return self
+
+    @property
+    def name(self) -> str:
+        """The scenario file's name without its ending."""
+        return self._path.stem
+
+    @property
+    def path(self) -> Path:
+        """The scenario file."""
+        return self._path
+
+    @property
+    def provenance(self) -> Mapping[str, Provenance]:
+        """Source, reason and unit of every value, by its path."""
+        return self._provenance
+
+    @property
+    def is_landing(self) -> bool:
+        """Whether this is a landing and not a general graph."""
+        return self.landing is not None
+
+    def changed(self, options: Settings | None = None, **simulation: Any) -> Scenario:
+        """Return a copy with other simulation settings (macro_step, …) and master `options`, checked again."""
+        document = self.model_dump()
+        document["simulation"] |= simulation
+        document["master"] = document["master"] if options is None else options
+        copy = Scenario.model_validate(document)
+        copy._path, copy._provenance = self._path, self._provenance
+        return copy
