@@ -3,7 +3,7 @@
 from __future__ import annotations
 
 import sys
-from importlib.metadata import version
+from importlib import metadata
 from pathlib import Path
 
 HERE = Path(__file__).resolve().parent
@@ -12,10 +12,10 @@ sys.path[:0] = [str(HERE / "_extensions")]
 project = "line-landing"
 author = "The line-landing authors"
 copyright = "2026, The line-landing authors"
-release = version("line-landing")
+release = metadata.version("line-landing")
 
 extensions = ["myst_parser", "sphinx.ext.autodoc", "sphinx.ext.autosummary", "plain_docstrings", "from_code"]
-exclude_patterns = ["_build", "figures"]
+exclude_patterns = ["_build", "figures", "reference/generated"]
 suppress_warnings = ["myst.header"]  # the page of `make verify` begins its studies at the third level
 myst_enable_extensions = ["attrs_inline", "colon_fence", "deflist"]
 myst_heading_anchors = 3

@@ -12,7 +12,7 @@ from pathlib import Path
 from typing import Any, get_args, get_type_hints
 
 from fmus.robot.module import robot_table
-from fmus.variables import Variable, VariableTable
+from fmus.module.variables import Variable, VariableTable
 from plain_docstrings import LITERAL, sections
 
 HEADINGS = {"parameter": "Parameters", "input": "Inputs", "output": "Outputs"}
@@ -85,7 +85,7 @@ def variables_page(title: str, table: VariableTable) -> str:
 
 def tables() -> dict[str, VariableTable]:
     """Return the variable table of every module; the robot's is that of one wheel."""
-    from orchestrator.vocabulary import MODELS
+    from orchestrator.catalogue.modules import MODELS
 
     found = {}
     for name, (file, class_name) in MODELS.items():
@@ -98,15 +98,16 @@ def tables() -> dict[str, VariableTable]:
 
 def masters_page() -> str:
     """Return the page of the masters: a line each, then what each is and its options with their defaults."""
-    from orchestrator.masters import MASTERS
-    from orchestrator.masters.implicit import Implicit
-    from orchestrator.vocabulary import masters, options_of
+    from orchestrator.coupling.masters import MASTERS
+    from orchestrator.coupling.masters.options import master_options
+    from orchestrator.coupling.stepping.implicit import Implicit
 
-    shared = options_of(Implicit)
+    keywords = inspect.signature(Implicit).parameters.values()
+    shared = {p.name: p.default for p in keywords if p.kind is p.KEYWORD_ONLY}
     lines = ["# Masters and their options", "", "| master | |", "|---|---|"]
     lines += [f"| [`{name}`](#{name}) | {master.TITLE} |" for name, master in MASTERS.items()]
     lines += ["", "(implicit-options)=", "## Options of every implicit master", "", *option_table(Implicit, shared)]
-    for name, options in masters().items():
+    for name, options in master_options().items():
         master = MASTERS[name]
         inherited = shared if issubclass(master, Implicit) else {}
         own = {key: value for key, value in options.items() if key not in inherited or inherited[key] != value}
@@ -156,7 +157,7 @@ def marked_down(text: str) -> str:
 def command_line_page() -> str:
     """Return the page of the command line, from the application itself."""
     import typer
-    from orchestrator.cli import app
+    from orchestrator.cli.commands import app
 
     group = typer.main.get_command(app)
     lines = ["# Commands", "", str(group.help), ""]

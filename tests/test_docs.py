@@ -1,0 +1,73 @@
+"""The documentation does what it says: snippets run, numbers are those of the files, sentences stay short.
+
+Blocks of a page run in order in one folder: Python in one namespace, shell with the program in reach. A block that begins
+with ``# file: NAME`` is saved under that name instead.
+"""
+
+from __future__ import annotations
+
+import os
+import re
+import subprocess
+import sys
+from pathlib import Path
+from typing import Any
+
+import pytest
+
+ROOT = Path(__file__).resolve().parents[1]
+DOCS = ROOT / "docs"
+EXECUTED = [DOCS / "start.md", *sorted(page for page in (DOCS / "howto").glob("*.md") if page.stem != "index")]
+BY_COMMAND = {DOCS / "verification.md", *(DOCS / "reference" / "generated").glob("*.md"), *(DOCS / "_build").rglob("*.md")}
+BY_HAND = sorted({*DOCS.rglob("*.md"), *ROOT.glob("*.md")} - BY_COMMAND - {ROOT / "CHANGELOG.md"})
+FENCE = re.compile(r"^```(\w+)\n(.*?)^```$", re.M | re.S)
+TO_FILE = re.compile(r"# file: (\S+)\n")
+
+
+def blocks(page: Path) -> list[tuple[str, str]]:
+    """Return language and text of the fenced blocks that are executed or saved."""
+    found = FENCE.findall(page.read_text(encoding="utf-8"))
+    return [(kind, text) for kind, text in found if kind in ("python", "shell") or TO_FILE.match(text)]
+
+
+def in_shell(text: str, folder: Path) -> None:
+    """Run a block as a shell would; the program of this environment is the one in reach."""
+    path = f"{Path(sys.executable).parent}{os.pathsep}{os.environ['PATH']}"
+    end = subprocess.run(
+        ["bash", "-ec", text], cwd=folder, env=os.environ | {"PATH": path}, capture_output=True, text=True, check=False
+    )
+    assert end.returncode == 0, f"{text}\n{end.stdout}\n{end.stderr}"
+
+
+@pytest.mark.parametrize("page", EXECUTED, ids=lambda page: page.stem)
+def test_the_snippets_of_the_page_run(page: Path, tmp_path: Path, monkeypatch: pytest.MonkeyPatch) -> None:
+    monkeypatch.chdir(tmp_path)
+    monkeypatch.syspath_prepend(str(tmp_path))
+    namespace: dict[str, Any] = {"__name__": page.stem}
+    executed = 0
+    for kind, text in blocks(page):
+        if name := TO_FILE.match(text):
+            (tmp_path / name[1]).parent.mkdir(parents=True, exist_ok=True)
+            (tmp_path / name[1]).write_text(text[name.end() :], encoding="utf-8")
+            continue
+        if kind == "python":
+            exec(compile(text, f"{page.name}: {text.splitlines()[0]}", "exec"), namespace)
+        else:
+            in_shell(text, tmp_path)
+        executed += 1
+    assert executed, f"{page}: nothing to execute; a how-to shows how"
+
+
+def prose(page: Path) -> str:
+    """Return the text of a page without code, tables, formulas, pictures and comments."""
+    text = re.sub(r"^```.*?^```$|<!--.*?-->", "", page.read_text(encoding="utf-8"), flags=re.M | re.S)
+    return re.sub(r"^(\||    |!\[|:).*$", "", text, flags=re.M)
+
+
+@pytest.mark.parametrize("page", BY_HAND, ids=lambda page: str(page.relative_to(ROOT)))
+def test_pages_are_for_a_tired_reader(page: Path) -> None:
+    text = page.read_text(encoding="utf-8")
+    long = [line for line in text.splitlines() if len(line) > 120 and not line.startswith(("|", "!["))]
+    assert not long, f"{page}: lines of more than 120 characters: {long}"
+    for paragraph in re.split(r"\n\s*\n|\n(?=[*#-] |\d\. )", prose(page)):
+        assert len(paragraph.split()) <= 100, f"{page}: more than 100 words in a paragraph: {paragraph}"
