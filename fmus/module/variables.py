@@ -6,6 +6,7 @@ index in the table is its FMI value reference and its place in the module's flat
 
 from __future__ import annotations
 
+import operator
 from collections.abc import Iterable, Mapping
 from dataclasses import dataclass
 from typing import Literal
@@ -19,6 +20,33 @@ Value = float | int | bool | str
 
 class ModuleError(Exception):
     """A module cannot go on: the message names the place, the cause and the cure."""
+
+
+@dataclass(frozen=True)
+class Bounds:
+    """Where a number may lie: ``ge <= value <= le``, ``gt < value < lt``; None is no bound.
+
+    Written once, in the variable table: model description, scenario and module read them there.
+    """
+
+    ge: float | None = None
+    gt: float | None = None
+    le: float | None = None
+    lt: float | None = None
+
+    def admit(self, value: float) -> bool:
+        """Return whether `value` is within the bounds; NaN never is, infinity only without a bound."""
+        pairs = ((self.ge, operator.ge), (self.gt, operator.gt), (self.le, operator.le), (self.lt, operator.lt))
+        return value == value and all(bound is None or holds(value, bound) for bound, holds in pairs)
+
+    def __str__(self) -> str:
+        """Say what is wanted: ``greater than 0``, ``at least 0 and at most 1``."""
+        words = ((self.gt, "greater than"), (self.ge, "at least"), (self.lt, "less than"), (self.le, "at most"))
+        return " and ".join(f"{word} {bound:g}" for bound, word in words if bound is not None)
+
+
+POSITIVE = Bounds(gt=0.0)
+NON_NEGATIVE = Bounds(ge=0.0)
 
 
 @dataclass(frozen=True)
@@ -36,6 +64,7 @@ class Variable:
     choices : the words a string may take
     discrete : changes at communication points only (an input is held, an output moves, between them)
     feedthrough : names of the inputs an output depends on without a step (outputs only)
+    bounds : of parameters and inputs
     """
 
     name: str
@@ -47,6 +76,7 @@ class Variable:
     choices: tuple[str, ...] = ()
     discrete: bool = False
     feedthrough: tuple[str, ...] = ()
+    bounds: Bounds = Bounds()
 
     def encode(self, value: Value) -> float:
         """Return `value` as the number kept in the flat array; raise `ModuleError` if it has no place
