@@ -6,6 +6,7 @@ with ``# file: NAME`` is saved under that name instead.
 
 from __future__ import annotations
 
+import importlib
 import os
 import re
 import subprocess
@@ -15,11 +16,14 @@ from typing import Any
 
 import pytest
 
+from orchestrator.coupling.masters.options import master_options
+
 ROOT = Path(__file__).resolve().parents[1]
 DOCS = ROOT / "docs"
 EXECUTED = [DOCS / "start.md", *sorted(page for page in (DOCS / "howto").glob("*.md") if page.stem != "index")]
-BY_COMMAND = {DOCS / "verification.md", *(DOCS / "reference" / "generated").glob("*.md"), *(DOCS / "_build").rglob("*.md")}
-BY_HAND = sorted({*DOCS.rglob("*.md"), *ROOT.glob("*.md")} - BY_COMMAND - {ROOT / "CHANGELOG.md"})
+BY_COMMAND = {DOCS / "verification.md", *DOCS.glob("reference/generated/*.md"), *DOCS.glob("_build/**/*.md")}
+PAGES = {*DOCS.rglob("*.md"), *ROOT.glob("*.md"), *ROOT.glob("fmus/*/README.md")}
+BY_HAND = sorted(PAGES - BY_COMMAND - {ROOT / "CHANGELOG.md"})
 FENCE = re.compile(r"^```(\w+)\n(.*?)^```$", re.M | re.S)
 TO_FILE = re.compile(r"# file: (\S+)\n")
 
@@ -69,5 +73,35 @@ def test_pages_are_for_a_tired_reader(page: Path) -> None:
     text = page.read_text(encoding="utf-8")
     long = [line for line in text.splitlines() if len(line) > 120 and not line.startswith(("|", "!["))]
     assert not long, f"{page}: lines of more than 120 characters: {long}"
-    for paragraph in re.split(r"\n\s*\n|\n(?=[*#-] |\d\. )", prose(page)):
+    for paragraph in re.split(r"\n\s*\n|\n(?=[*-] |\d\. )|^#.*$", prose(page), flags=re.M):
         assert len(paragraph.split()) <= 100, f"{page}: more than 100 words in a paragraph: {paragraph}"
+
+
+@pytest.fixture(scope="module")
+def from_code() -> Any:
+    """What makes the generated pages."""
+    sys.path.insert(0, str(DOCS / "_extensions"))
+    yield importlib.import_module("from_code")
+    sys.path.remove(str(DOCS / "_extensions"))
+
+
+def test_the_reference_names_every_variable_of_every_module(from_code: Any) -> None:
+    for name, table in from_code.tables().items():
+        page = from_code.variables_page(name, table)
+        missing = [v.name for v in table.variables if f"`{from_code.pattern(v.name)}`" not in page]
+        assert not missing, name
+
+
+def test_the_reference_names_every_master_with_its_options(from_code: Any) -> None:
+    page = from_code.masters_page()
+    for name, options in master_options().items():
+        assert f"## {name}\n" in page
+        assert [key for key in options if f"| `{key}` |" not in page] == []
+
+
+def test_the_reference_names_every_command_and_option(from_code: Any) -> None:
+    page = from_code.command_line_page()
+    for option in ("--macro-steps", "--robot", "--set", "--contract"):
+        assert f"`{option} " in page
+    for command in ("build", "check", "compare", "list", "modes", "report", "run", "validate"):
+        assert f"## {command}\n" in page

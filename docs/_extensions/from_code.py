@@ -11,9 +11,10 @@ from collections.abc import Iterable, Iterator
 from pathlib import Path
 from typing import Any, get_args, get_type_hints
 
-from fmus.robot.module import robot_table
-from fmus.module.variables import Variable, VariableTable
 from plain_docstrings import LITERAL, sections
+
+from fmus.module.variables import Variable, VariableTable
+from fmus.robot.module import robot_table
 
 HEADINGS = {"parameter": "Parameters", "input": "Inputs", "output": "Outputs"}
 
@@ -157,6 +158,7 @@ def marked_down(text: str) -> str:
 def command_line_page() -> str:
     """Return the page of the command line, from the application itself."""
     import typer
+
     from orchestrator.cli.commands import app
 
     group = typer.main.get_command(app)

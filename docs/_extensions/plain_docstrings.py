@@ -19,9 +19,7 @@ MARKUP = re.compile(r"([\\*_|])")
 def escaped(text: str) -> str:
     """Return `text` with all markup of reStructuredText disarmed but for what is in backticks."""
     parts = LITERAL.split(text)
-    return "".join(
-        f"``{part.strip('`')}``" if i % 2 else MARKUP.sub(r"\\\1", part) for i, part in enumerate(parts)
-    )
+    return "".join(f"``{part.strip('`')}``" if i % 2 else MARKUP.sub(r"\\\1", part) for i, part in enumerate(parts))
 
 
 def sections(lines: list[str]) -> Iterator[tuple[str, list[str]]]:
