@@ -7,8 +7,10 @@ with ``# file: NAME`` is saved under that name instead.
 from __future__ import annotations
 
 import importlib
+import json
 import os
 import re
+import runpy
 import subprocess
 import sys
 from pathlib import Path
@@ -115,3 +117,12 @@ def test_pages_that_the_code_points_to_exist() -> None:
     for file in [*files, ROOT / "README.md", ROOT / "CONTRIBUTING.md"]:
         named = re.findall(r"(?<![\w/])docs/[\w/]+\.\w+", file.read_text(encoding="utf-8"))
         assert [page for page in named if not (ROOT / page).exists()] == [], file
+
+
+def test_measured_numbers_are_those_of_the_file() -> None:
+    measured = runpy.run_path(str(DOCS / "measured.py"))
+    found = json.loads(measured["FILE"].read_text(encoding="utf-8"))
+    for page in measured["PAGES"]:
+        text = page.read_text(encoding="utf-8")
+        assert measured["BLOCK"].search(text), page
+        assert measured["filled"](text, found) == text, f"{page}: python docs/measured.py --fill"
