@@ -29,4 +29,6 @@ K = np.array([[110.0, -100.0], [-100.0, 110.0]])
 system = np.block([[np.zeros((2, 2)), np.eye(2)], [-K, np.zeros((2, 2))]])
 exact = (expm(system * log.time[-1]) @ [1.0, 0.0, 0.0, 0.0])[0]
 error = abs(log.signal("left.position")[-1] - exact)
-print(f"x(1 s) = {log.signal('left.position')[-1]:.6f}, exact {exact:.6f}, {log.iterations_per_step:.1f} iterations a step")
+print(
+    f"x(1 s) = {log.signal('left.position')[-1]:.6f}, exact {exact:.6f}, {log.iterations_per_step:.1f} iterations a step"
+)

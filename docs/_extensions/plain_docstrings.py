@@ -13,13 +13,19 @@ from typing import Any
 
 SECTIONS = ("Parameters", "Attributes", "Returns", "Yields", "Raises", "Notes", "Source", "Reference", "Examples")
 LITERAL = re.compile(r"(``.+?``|`[^`]+`)")
+EMPHASIS = re.compile(r"((?<![\w*])\*\w[^*\n]*\*(?![\w*]))")
 MARKUP = re.compile(r"([\\*_|])")
 
 
 def escaped(text: str) -> str:
-    """Return `text` with all markup of reStructuredText disarmed but for what is in backticks."""
+    """Return `text` with all markup of reStructuredText disarmed but for what is in backticks, and emphasis."""
     parts = LITERAL.split(text)
-    return "".join(f"``{part.strip('`')}``" if i % 2 else MARKUP.sub(r"\\\1", part) for i, part in enumerate(parts))
+    return "".join(f"``{part.strip('`')}``" if i % 2 else _escaped(part) for i, part in enumerate(parts))
+
+
+def _escaped(text: str) -> str:
+    parts = EMPHASIS.split(text)
+    return "".join(part if i % 2 else MARKUP.sub(r"\\\1", part) for i, part in enumerate(parts))
 
 
 def sections(lines: list[str]) -> Iterator[tuple[str, list[str]]]:
@@ -86,5 +92,14 @@ def setup(app: Any) -> dict[str, bool]:
     def process(_app: Any, _what: str, _name: str, _object: Any, _options: Any, lines: list[str]) -> None:
         lines[:] = converted(lines)
 
+    def shorten(
+        _app: Any, _what: str, _name: str, _object: Any, _options: Any, signature: str | None, returns: Any
+    ) -> Any:
+        """Shorten the types of a signature that Sphinx cannot read (a field's factory), as it does with the others."""
+        if signature and "<factory>" in signature:
+            return re.sub(r"~[\w.]+\.(\w+)", r"\1", signature).replace("<factory>", "…"), returns
+        return None
+
     app.connect("autodoc-process-docstring", process)
+    app.connect("autodoc-process-signature", shorten)
     return {"parallel_read_safe": True}
