@@ -73,8 +73,7 @@ def fallen(macro_step: float) -> dict[str, Any]:
     """Return the row of an explicit run with too long a step: whether the robot falls off the line."""
     import orchestrator
 
-    no_estimate = {"simulation.estimate": "none"}
-    run = orchestrator.run(SCENARIO, master=EXPLICIT, macro_step=macro_step, stop=STOP, set=no_estimate)
+    run = orchestrator.run(SCENARIO, master=EXPLICIT, macro_step=macro_step, stop=STOP, estimate="none")
     return {"master": EXPLICIT, "macro_step": macro_step, "fallen": bool(run.summary["left_the_groove"])}
 
 

@@ -8,11 +8,12 @@ z = run.signals["robot.body.position.z"]
 roll = run.signals["robot.roll"]
 force = run.signals["contact1.normal_force"]
 
-lowest = int(z.argmin())
-print(f"goes down by {z[0] - z.min():.3f} {z.unit}, lowest at t = {z.time[lowest]:.2f} s")
-print(f"rolls up to {abs(roll).max():.4f} {roll.unit}; the wheel carries up to {force.max():.0f} {force.unit}")
+lowest = int(z.values.argmin())
+print(f"goes down by {z[0] - z[lowest]:.3f} {z.unit}, lowest at t = {z.time[lowest]:.2f} s")
+print(f"rolls up to {abs(roll.values).max():.4f} {roll.unit}")
+print(f"the wheel carries up to {force.values.max():.0f} {force.unit}")
 
 # how wrong is this? The run says so itself, in each signal's unit
-for name, error in run.summary["estimated_error"].items():
+for name, error in run.estimated_error.items():
     print(f"{name}: about {error:.1e} {run.signals[name].unit} off")
 print("verdict:", run.verdict)

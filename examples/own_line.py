@@ -8,9 +8,6 @@ LINE = """
 extends = "landing_200m_point9"
 title = "A span of 120 m with 3 m of sag, landing at its middle"
 
-[simulation]
-estimate = "none"
-
 [cable.parameters]
 span = { value = 120.0, unit = "m", source = "survey" }
 sag = { value = 300.0, unit = "cm", source = "survey, at 15 °C" }
@@ -21,7 +18,7 @@ position = { value = 60.0, unit = "m", source = "planned" }
 """
 
 Path("short_span.toml").write_text(LINE, encoding="utf-8")
-run = orchestrator.run("short_span.toml", stop=0.5)
+run = orchestrator.run("short_span.toml", stop=0.5, estimate="none")
 
 height = run.signals["cable.port[1].position.z"]
 tension = run.signals["cable.tension_mid"]

@@ -5,13 +5,13 @@ import json
 
 import orchestrator
 
-run = orchestrator.run("drop_5cm", stop=0.3, out="drop", set={"simulation.estimate": "none"})
+run = orchestrator.run("drop_5cm", stop=0.3, out="drop", estimate="none")
 
 # again from disk: what the directory holds is what the run had
 old = orchestrator.load_run("drop")
 force = old.signals["contact1.normal_force"]
 touch = float(force.time[(force.values > 0.0).argmax()])
-print(f"touches at t = {touch:.3f} s, largest force {force.max():.0f} {force.unit}")
+print(f"touches at t = {touch:.3f} s, largest force {force.values.max():.0f} {force.unit}")
 
 # without this program: plain files
 with open("drop/results.csv", newline="") as file:
