@@ -66,13 +66,16 @@ def cell(text: str) -> str:
     return text.replace("|", "\\|").replace("*)", "\\*)").replace("k * p", "k · p").replace("D * p", "D · p")
 
 
-def variable_rows(variables: Iterable[Variable], *, with_start: bool) -> Iterator[str]:
-    """Yield the lines of a table of variables."""
-    yield "| name | unit | start | |" if with_start else "| name | unit | |"
-    yield "|---|---|---|---|" if with_start else "|---|---|---|"
+def variable_rows(variables: Iterable[Variable], causality: str) -> Iterator[str]:
+    """Yield the lines of a table of variables; outputs have no start value, parameters may have bounds."""
+    columns = {"parameter": ["start", "may be"], "input": ["start"]}.get(causality, [])
+    heads = ["name", "unit", *columns, ""]
+    yield f"| {' | '.join(heads)} |"
+    yield "|" + "---|" * len(heads)
     for name, members in grouped(variables).items():
-        start = f" {start_value(members)} |" if with_start else ""
-        yield f"| `{name}` | {members[0].unit} |{start} {meaning(members[0])} |"
+        first = members[0]
+        cells = {"start": start_value(members), "may be": cell(str(first.bounds))}
+        yield f"| {' | '.join([f'`{name}`', first.unit, *(cells[c] for c in columns), meaning(first)])} |"
 
 
 def variables_page(title: str, table: VariableTable) -> str:
@@ -80,7 +83,7 @@ def variables_page(title: str, table: VariableTable) -> str:
     lines = [f"# Variables of the {title}", ""]
     for causality, heading in HEADINGS.items():
         chosen = [v for v in table.variables if v.causality == causality]
-        lines += [f"## {heading}", "", *variable_rows(chosen, with_start=causality != "output"), ""]
+        lines += [f"## {heading}", "", *variable_rows(chosen, causality), ""]
     return "\n".join(lines)
 
 
