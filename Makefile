@@ -9,7 +9,7 @@ STAMP := $(VENV)/.installed
 
 export OPENBLAS_NUM_THREADS ?= 1
 
-.PHONY: env run test lint verify bench clean
+.PHONY: env run test lint docs measure verify bench clean
 
 env: $(STAMP)
 
@@ -37,6 +37,17 @@ lint: env
 	$(BIN)/ruff format --check .
 	$(BIN)/pyright
 	$(BIN)/lint-imports
+
+$(VENV)/.docs: $(STAMP)
+	@$(BIN)/python -m pip install --quiet --disable-pip-version-check -e '.[docs]'
+	@touch $@
+
+docs: $(VENV)/.docs
+	$(BIN)/python -m sphinx -q -n -W --keep-going -b html docs docs/_build/html
+	@echo "docs/_build/html/index.html"
+
+measure: env
+	$(BIN)/python docs/measured.py
 
 verify: env
 	$(BIN)/python -m verification
