@@ -57,4 +57,4 @@ bench: env
 	@for file in $(wildcard benchmarks/*.py); do echo "== $$file"; $(BIN)/python "$$file"; done
 
 clean:
-	rm -rf $(VENV) build fmu
+	rm -rf $(VENV) build dist

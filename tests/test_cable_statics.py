@@ -1,6 +1,5 @@
 """The cable at rest, held against independent solutions (`verification/cable`), and where there is none."""
 
-
 import numpy as np
 import pytest
 from hypothesis import given, settings
