@@ -22,10 +22,10 @@ from orchestrator.runs.estimate import estimate_error
 from orchestrator.runs.files import summary
 from orchestrator.runs.record import Coupled
 from orchestrator.scenario.read import load
-from orchestrator.scenario.types import Scenario
+from orchestrator.scenario.types import LandingScenario, Scenario
 from tests.fmus import fmu
-from tests.test_cli import LANDING, OSCILLATOR, exact_oscillator
-from tests.test_masters import ITERATED, run
+from tests.scenarios import LANDING, OSCILLATOR, exact_oscillator
+from tests.systems import ITERATED, run
 
 RECORD = ["a.position", "a.velocity", "b.position", "b.velocity"]
 
@@ -156,19 +156,19 @@ def test_steps_and_tolerances_change_together(kind, ratio, stop):
     """Eleven macro steps: one is left over where they are doubled. The robot's inner step is its table's default."""
     scenario = landing(f"simulation.estimate={kind}", "master.local_tolerance=1e-6")
     other = estimate.second(scenario)
-    assert other is not None and other.cable is not None and other.robot is not None
+    assert isinstance(other, LandingScenario)
     assert other.simulation.macro_step == 0.005 * ratio and other.simulation.stop_time == pytest.approx(stop)
     assert "integration_step" not in other.cable.parameters  # it follows the macro step
     assert other.robot.parameters["integration_step"] == 0.001 * ratio
     changes = {name: change if ratio > 1 else 1 / change for name, change in estimate.TOLERANCES.items()}
     before = {"tolerance": 1e-6, "local_tolerance": 1e-6}
     assert other.master == {name: pytest.approx(before[name] * change) for name, change in changes.items()}
-    assert scenario.robot is not None and "integration_step" not in scenario.robot.parameters
+    assert isinstance(scenario, LandingScenario) and "integration_step" not in scenario.robot.parameters
 
 
 def test_an_inner_step_of_the_scenario_is_halved():
     other = estimate.second(landing("cable.parameters.integration_step=0.002"))
-    assert other is not None and other.cable is not None and other.cable.parameters["integration_step"] == 0.001
+    assert isinstance(other, LandingScenario) and other.cable.parameters["integration_step"] == 0.001
 
 
 @pytest.mark.parametrize(

@@ -6,7 +6,7 @@ import pytest
 
 from orchestrator.coupling.errors import InputError
 from orchestrator.scenario.read import load
-from orchestrator.scenario.types import Scenario
+from orchestrator.scenario.types import GraphScenario, LandingScenario
 
 FOLDER = Path(__file__).resolve().parents[1] / "scenarios"
 LANDINGS = sorted(path for path in FOLDER.glob("*.toml") if "[landing]" in path.read_text(encoding="utf-8"))
@@ -50,7 +50,7 @@ def replaced(path: Path, old: str, new: str) -> Path:
 @pytest.mark.parametrize("path", LANDINGS, ids=lambda path: path.stem)
 def test_shipped_scenarios_are_valid_and_sourced(path: Path):
     scenario = load(path)
-    assert scenario.is_landing and scenario.name == path.stem
+    assert isinstance(scenario, LandingScenario) and scenario.name == path.stem
     for key, provenance in scenario.provenance.items():
         if key.startswith(("cable.parameters.", "contact.parameters.", "landing.")):
             assert provenance.source != "scenario", f"{key} says not where it comes from"
@@ -58,21 +58,21 @@ def test_shipped_scenarios_are_valid_and_sourced(path: Path):
 
 def test_values_and_provenance(file: Path):
     scenario = load(file)
-    assert scenario.cable is not None and scenario.cable.parameters["span"] == 50.0
+    assert isinstance(scenario, LandingScenario) and scenario.cable.parameters["span"] == 50.0
     assert scenario.provenance["cable.parameters.span"].source == "a drawing"
     assert scenario.provenance["landing.position"].source == "scenario"
 
 
 def test_dotted_parameter_names_are_one_name(file: Path):
     scenario = load(file, ["robot.parameters.inertia.xx=7.5"])
-    assert scenario.robot is not None and scenario.robot.parameters == {"inertia.xx": 7.5}
+    assert isinstance(scenario, LandingScenario) and scenario.robot.parameters == {"inertia.xx": 7.5}
 
 
 def test_overrides_have_toml_types_and_their_own_provenance(file: Path):
     scenario = load(
         file, ["cable.parameters.clamped=true", "cable.parameters.n_elements=10", "simulation.master=jacobi"]
     )
-    assert scenario.cable is not None
+    assert isinstance(scenario, LandingScenario)
     assert scenario.cable.parameters["clamped"] is True and scenario.cable.parameters["n_elements"] == 10
     assert scenario.simulation.master == "jacobi"
     assert scenario.provenance["cable.parameters.clamped"].source == "command line"
@@ -82,7 +82,7 @@ def test_another_robot_and_another_master(file: Path):
     text = GOOD.replace("[cable", 'exchange = "hermite"\n[master]\ntolerance = 1e-6\n[cable', 1)
     file.write_text(text, encoding="utf-8")
     scenario = load(file, robot="hybrid_robot_2", master="jacobi")
-    assert scenario.robot is not None and scenario.robot.model == "hybrid_robot_2"
+    assert isinstance(scenario, LandingScenario) and scenario.robot.model == "hybrid_robot_2"
     assert scenario.master == {} and scenario.simulation.exchange is None
 
 
@@ -140,6 +140,28 @@ def test_all_mistakes_are_collected(file: Path):
     assert len(found) == 3
 
 
+def test_a_general_graph_has_components_and_no_landing():
+    scenario = load(FOLDER / "oscillator.toml")
+    assert isinstance(scenario, GraphScenario) and set(scenario.components) == {"left", "right"}
+    assert isinstance(scenario.changed(macro_step=0.02), GraphScenario)
+
+
+@pytest.mark.parametrize(
+    ("old", "new", "message"),
+    [
+        ("[landing]", '[components.a]\nmodel = "oscillator"\n[landing]', "has both components and a landing; give one"),
+        (
+            'title = "A landing"',
+            'title = "A landing"\ncompnents = 1',
+            "compnents: unknown key; did you mean components?",
+        ),
+    ],
+)
+def test_what_is_neither_a_landing_nor_a_graph(file: Path, old: str, new: str, message: str):
+    (found,) = problems(replaced(file, old, new))
+    assert message in found
+
+
 def test_missing_sections_and_keys(file: Path):
     assert any("landing: missing" in line for line in problems(replaced(file, "[landing]\nposition = 20.0", "")))
     assert f"{file}: simulation.stop_time: missing" in problems(replaced(file, "stop_time = 1.0", ""))
@@ -171,5 +193,6 @@ def test_fmu_paths_are_relative_to_the_scenario(file: Path, tmp_path: Path):
 def test_changed_copy_keeps_the_rest(file: Path):
     scenario = load(file)
     copy = scenario.changed(macro_step=0.01)
-    assert isinstance(copy, Scenario) and copy.simulation.macro_step == 0.01
-    assert copy.cable == scenario.cable and copy.provenance == scenario.provenance and copy.path == scenario.path
+    assert isinstance(copy, LandingScenario) and copy.simulation.macro_step == 0.01
+    assert isinstance(scenario, LandingScenario) and copy.cable == scenario.cable
+    assert copy.provenance == scenario.provenance and copy.path == scenario.path

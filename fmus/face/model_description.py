@@ -3,7 +3,6 @@
 from __future__ import annotations
 
 import html
-import re
 from collections.abc import Iterable
 from xml.etree.ElementTree import Element, SubElement, indent, tostring
 
@@ -11,21 +10,8 @@ import numpy as np
 from pythonfmu._version import __version__ as PYTHONFMU_VERSION
 
 from fmus.module.recipe import FmuRecipe
+from fmus.module.units import unit
 from fmus.module.variables import Variable, VariableTable
-
-SYMBOLS: dict[str, dict[str, int]] = {
-    "1": {},
-    "m": {"m": 1},
-    "kg": {"kg": 1},
-    "s": {"s": 1},
-    "rad": {"rad": 1},
-    "Hz": {"s": -1},
-    "N": {"kg": 1, "m": 1, "s": -2},
-    "Pa": {"kg": 1, "m": -1, "s": -2},
-    "J": {"kg": 1, "m": 2, "s": -2},
-    "W": {"kg": 1, "m": 2, "s": -3},
-}
-"""Exponents of the base units in each unit symbol."""
 
 CAPABILITIES = {
     "needsExecutionTool": "true",
@@ -46,20 +32,6 @@ LOG_CATEGORIES = {
 }
 
 XML_TYPES = {"real": "Real", "integer": "Integer", "boolean": "Boolean", "string": "String"}
-
-
-def base_unit(unit: str) -> dict[str, int] | None:
-    """Return the exponents of the base units in `unit`, e.g. ``kg.m2/s``; None if not fixed (``N/m^n``)."""
-    exponents: dict[str, int] = {}
-    for place, part in enumerate(unit.split("/")):
-        for factor in part.strip("()").split("."):
-            match = re.fullmatch(r"([A-Za-z]+|1)\^?(\d*)", factor)
-            if match is None or match[1] not in SYMBOLS:
-                return None
-            power = int(match[2] or 1) * (-1 if place else 1)
-            for base, exponent in SYMBOLS[match[1]].items():
-                exponents[base] = exponents.get(base, 0) + power * exponent
-    return {base: exponent for base, exponent in exponents.items() if exponent}
 
 
 def variability(variable: Variable) -> str:
@@ -103,11 +75,12 @@ def model_description(recipe: FmuRecipe, table: VariableTable, values: np.ndarra
 
 def _add_units(root: Element, units: Iterable[str]) -> None:
     definitions = SubElement(root, "UnitDefinitions")
-    for unit in units:
-        node = SubElement(definitions, "Unit", name=unit)
-        exponents = base_unit(unit)
-        if exponents is not None:
-            SubElement(node, "BaseUnit", {base: str(exponent) for base, exponent in exponents.items()})
+    for name in units:
+        node = SubElement(definitions, "Unit", name=name)
+        known = unit(name)
+        if known is not None:
+            factor = {"factor": repr(float(known.factor))} if known.factor != 1 else {}
+            SubElement(node, "BaseUnit", {base: str(n) for base, n in known.exponents.items()} | factor)
 
 
 def _add_variables(root: Element, table: VariableTable, values: np.ndarray) -> None:
@@ -127,9 +100,17 @@ def _add_variables(root: Element, table: VariableTable, values: np.ndarray) -> N
         typed = SubElement(node, XML_TYPES[variable.kind])
         if variable.kind == "real":
             typed.set("unit", variable.unit)
+        _add_bounds(typed, variable)
         if variable.causality != "output":
             start = variable.decode(values[reference])
             typed.set("start", str(start).lower() if isinstance(start, bool) else str(start))
+
+
+def _add_bounds(typed: Element, variable: Variable) -> None:
+    """Add min and max: FMI 2.0 knows no exclusive bound, so that one stands there as if it were allowed."""
+    for name, bound in (("min", variable.bounds.lowest), ("max", variable.bounds.highest)):
+        if bound is not None:
+            typed.set(name, str(int(bound) if variable.kind == "integer" else float(bound)))
 
 
 def _add_structure(root: Element, table: VariableTable) -> None:
@@ -162,7 +143,7 @@ def documentation(recipe: FmuRecipe, table: VariableTable, values: np.ndarray, r
 A step that fails is discarded and leaves the FMU as it was; a failed initialisation is fatal; the log says
 why.</p>
 <table>
-<tr><th>name</th><th>causality</th><th>type</th><th>unit</th><th>start</th><th>description</th></tr>
+<tr><th>name</th><th>causality</th><th>type</th><th>unit</th><th>start</th><th>bounds</th><th>description</th></tr>
 {rows}
 </table>
 <pre>
@@ -179,5 +160,5 @@ def _row(variable: Variable, number: float) -> str:
     if variable.choices:
         description += f" ({', '.join(variable.choices)})"
     unit = variable.unit if variable.kind == "real" else ""
-    cells = (variable.name, variable.causality, variable.kind, unit, start, description)
+    cells = (variable.name, variable.causality, variable.kind, unit, start, str(variable.bounds), description)
     return "<tr>" + "".join(f"<td>{html.escape(cell)}</td>" for cell in cells) + "</tr>"

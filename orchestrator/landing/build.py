@@ -22,7 +22,7 @@ from orchestrator.coupling.errors import InputError
 from orchestrator.coupling.fmu.instance import Fmu
 from orchestrator.landing.monolithic import Problem
 from orchestrator.landing.placement import Placement, place
-from orchestrator.scenario.types import Scenario
+from orchestrator.scenario.types import LandingScenario
 
 NOT_NEEDED = ("initial.", ".braked", ".inertia", ".axle_direction", "integration_step", "n_wheels", "center_of_mass")
 """Robot parameters that a reference takes at their defaults where a foreign robot does not have them."""
@@ -39,9 +39,8 @@ class Parts:
     spec: RobotSpec | None
 
 
-def parts(scenario: Scenario) -> Parts:
+def parts(scenario: LandingScenario) -> Parts:
     """Return the parameters of the scenario's components, the robot's catalogue entry included."""
-    assert scenario.cable is not None and scenario.robot is not None
     section = scenario.robot
     spec = load_robot(section.model) if section.model is not None else None
     robot = dict(spec.parameters) if spec is not None else {}
@@ -64,16 +63,15 @@ def _wheels_of(path: Path) -> int:
     return n
 
 
-def problem(scenario: Scenario) -> Problem:
+def problem(scenario: LandingScenario) -> Problem:
     """Return the landing as initialised modules, for the monolithic solver."""
     made, placement = placed(scenario)
     made.robot.initialize(0.0)
     return Problem(made.cable, made.robot, [contact_at(scenario, s) for s in placement.arc_lengths])
 
 
-def has_monolithic(scenario: Scenario) -> bool:
+def has_monolithic(scenario: LandingScenario) -> bool:
     """Return whether the monolithic solver can stand for the scenario's FMUs, foreign ones included."""
-    assert scenario.cable is not None and scenario.robot is not None
     if scenario.contact.fmu is not None:
         return False
     wanted = {scenario.cable.fmu: Cable.table, scenario.robot.fmu: Robot(parts(scenario).n_wheels).table}
@@ -85,9 +83,8 @@ def has_monolithic(scenario: Scenario) -> bool:
     return True
 
 
-def placed(scenario: Scenario) -> tuple[Problem, Placement]:
+def placed(scenario: LandingScenario) -> tuple[Problem, Placement]:
     """Return cable (initialised), robot and one contact with their parameters, and the robot's placement."""
-    assert scenario.cable is not None and scenario.robot is not None and scenario.landing is not None
     resolved, landing = parts(scenario), scenario.landing
     try:
         cable = Cable()
@@ -140,7 +137,7 @@ def _look_at(robot: Robot, path: Path, resolved: Parts) -> None:
         fmu.close()
 
 
-def contact_at(scenario: Scenario, s: float) -> Contact:
+def contact_at(scenario: LandingScenario, s: float) -> Contact:
     """Return a contact module at arc length `s`."""
     contact = Contact()
     _assign(contact.table, contact.values, parts(scenario).contact | {"initial.s": s})

@@ -7,10 +7,10 @@ from collections.abc import Mapping
 import numpy as np
 
 from fmus.cable.module import N_SHAPE, Cable
-from orchestrator.scenario.types import Scenario
+from orchestrator.scenario.types import LandingScenario
 
 
-def cable_fields(scenario: Scenario, table: Mapping[str, np.ndarray]) -> dict[str, np.ndarray]:
+def cable_fields(scenario: LandingScenario, table: Mapping[str, np.ndarray]) -> dict[str, np.ndarray]:
     """Return shape and tension of the cable over time from its signals; empty if it does not show them.
 
     Returns
@@ -24,7 +24,6 @@ def cable_fields(scenario: Scenario, table: Mapping[str, np.ndarray]) -> dict[st
         [np.stack([table[f"cable.shape[{i}].position.{axis}"] for axis in "xyz"], axis=-1) for i in points], axis=1
     )
     tension = np.stack([table[f"cable.shape[{i}].tension"] for i in points], axis=1)
-    assert scenario.cable is not None
     length = float(scenario.cable.parameters.get("unstretched_length", Cable.table["unstretched_length"].start))
     return {
         "time": np.asarray(table["time"]),

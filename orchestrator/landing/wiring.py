@@ -13,22 +13,21 @@ from orchestrator.coupling.fmu.sub_steps import instance
 from orchestrator.coupling.graph.graph import Graph
 from orchestrator.coupling.graph.links import Connection
 from orchestrator.landing.build import parts, placed
-from orchestrator.scenario.types import Scenario
+from orchestrator.scenario.types import LandingScenario
 
 INNER_STEPS = {"waveform": 4, "hermite": 4, "point": 1}
 """Inner steps of our cable in a macro step, where the scenario gives no `integration_step`. The error that they leave
-shrinks with the macro step as that of the exchange does, and stays a tenth of it (docs/decisions.md)."""
+shrinks with the macro step as that of the exchange does, and stays a tenth of it (docs/notebook/decisions.md)."""
 LONGEST_ADAPTIVE = 2.5e-3
 """Longest such step, s, where the master's steps are adaptive: long macro steps are then wanted, and the local error does
-not tell that of the cable's inner steps (docs/masters.md)."""
+not tell that of the cable's inner steps (docs/notebook/adaptive.md)."""
 
 
-def landing_graph(scenario: Scenario, exchange: str) -> Graph:
+def landing_graph(scenario: LandingScenario, exchange: str) -> Graph:
     """Return the graph of loaded FMUs: cable, robot, one contact a wheel, connected by the contract.
 
     `waveform` becomes `hermite` where cable or robot does not give its means, `point` where one takes no slopes.
     """
-    assert scenario.cable is not None and scenario.robot is not None
     resolved, (_, placement) = parts(scenario), placed(scenario)
     components: dict[str, Fmu] = {}
     try:
@@ -52,9 +51,8 @@ def landing_graph(scenario: Scenario, exchange: str) -> Graph:
         raise
 
 
-def _inner_step(scenario: Scenario, exchange: str) -> dict[str, Value]:
+def _inner_step(scenario: LandingScenario, exchange: str) -> dict[str, Value]:
     """Return the longest inner step of our own cable."""
-    assert scenario.cable is not None
     step = scenario.simulation.macro_step / INNER_STEPS[exchange]
     if scenario.master.get("local_tolerance"):
         step = min(step, LONGEST_ADAPTIVE)

@@ -22,7 +22,7 @@ from orchestrator.coupling.run.results import Table
 from orchestrator.landing.contract import BREAKS, check_variables
 from orchestrator.landing.fields import cable_fields
 from orchestrator.landing.wiring import landing_graph
-from orchestrator.scenario.types import Scenario
+from orchestrator.scenario.types import GraphScenario, LandingScenario, Scenario
 
 HOLDING = ("held", "point")
 """Exchanges in which our modules neither give nor take slopes and means."""
@@ -38,8 +38,7 @@ def exchange_of(scenario: Scenario) -> str:
 def opened(scenario: Scenario) -> Iterator[Graph]:
     """Give the scenario's graph of loaded FMUs; `InputError` if it cannot be made."""
     try:
-        _require_contract(scenario)
-        graph = landing_graph(scenario, exchange_of(scenario)) if scenario.is_landing else _general_graph(scenario)
+        graph = _landing_graph(scenario) if isinstance(scenario, LandingScenario) else _general_graph(scenario)
         check_steps(graph.components, scenario.simulation.macro_step)  # type: ignore[arg-type]
     except (ModuleError, ValueError) as error:
         raise InputError(f"{scenario.path}: {line}" for line in str(error).splitlines()) from None
@@ -51,11 +50,16 @@ def opened(scenario: Scenario) -> Iterator[Graph]:
         graph.close()
 
 
-def _require_contract(scenario: Scenario) -> None:
+def _landing_graph(scenario: LandingScenario) -> Graph:
+    _require_contract(scenario)
+    return landing_graph(scenario, exchange_of(scenario))
+
+
+def _require_contract(scenario: LandingScenario) -> None:
     """Hold the foreign FMUs of a landing against their contracts."""
     sections = {"cable": scenario.cable, "robot": scenario.robot, "contact": scenario.contact}
-    for kind, section in sections.items() if scenario.is_landing else ():
-        if section is None or section.fmu is None:
+    for kind, section in sections.items():
+        if section.fmu is None:
             continue
         findings = check_variables(kind, vocabulary.of_fmu(Path(section.fmu)))
         lines = [f"{kind}.fmu: {f.what} is {f.verdict}: {f.note}" for f in findings if f.verdict in BREAKS]
@@ -63,7 +67,7 @@ def _require_contract(scenario: Scenario) -> None:
             raise ValueError("\n".join([*lines, f"`orchestrator check {section.fmu}` shows the whole contract"]))
 
 
-def _general_graph(scenario: Scenario) -> Graph:
+def _general_graph(scenario: GraphScenario) -> Graph:
     components: dict[str, Fmu] = {}
     try:
         for name, section in scenario.components.items():
@@ -138,4 +142,4 @@ def only_couples(name: str, contacts: int) -> bool:
 def split_fields(scenario: Scenario, table: Table) -> tuple[dict[str, np.ndarray], Table]:
     """Return the cable's shape and tension over time as arrays, and the table without them."""
     rest = {name: values for name, values in table.items() if not name.startswith("cable.shape[")}
-    return cable_fields(scenario, table) if scenario.is_landing else {}, rest
+    return cable_fields(scenario, table) if isinstance(scenario, LandingScenario) else {}, rest

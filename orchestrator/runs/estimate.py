@@ -7,7 +7,7 @@ rule):
     finer, at H/2:   e(H) = d 2^p / (2^p - 1),  between d and 2 d for any p >= 1
     coarser, at 2H:  e(H) = d / (2^p - 1),      between d / 15 and d for p from 4 to 1
 
-What the estimate depends on is whether the error falls with the step, and at H/2 it mostly does (docs/estimate.md).
+What the estimate depends on is whether the error falls with the step, and at H/2 it mostly does (docs/notebook/estimate.md).
 """
 
 from __future__ import annotations
@@ -22,7 +22,7 @@ from orchestrator.coupling.masters.options import master_options
 from orchestrator.coupling.run.compare import largest_difference
 from orchestrator.runs.coupled import completed
 from orchestrator.runs.record import Coupled, Progress
-from orchestrator.scenario.types import CableSection, Component, RobotSection, Scenario
+from orchestrator.scenario.types import CableSection, Component, GraphScenario, RobotSection, Scenario
 
 RATIOS = {"finer": 0.5, "coarser": 2.0}
 """Estimate → steps of the second run over those of the first."""
@@ -68,10 +68,13 @@ def _inner_steps(scenario: Scenario) -> Iterator[tuple[CableSection | RobotSecti
 
     That of our cable follows the macro step where the scenario gives none (`orchestrator.landing`).
     """
-    ours: list[tuple[str, CableSection | RobotSection | Component | None]]
-    ours = [("cable", scenario.cable), ("robot", scenario.robot)]
-    for module, section in ours + [(str(c.model), c) for c in scenario.components.values()]:
-        if section is None or (section is scenario.cable and not section.fmu and INNER_STEP not in section.parameters):
+    sections: list[tuple[str, CableSection | RobotSection | Component]]
+    if isinstance(scenario, GraphScenario):
+        sections = [(str(component.model), component) for component in scenario.components.values()]
+    else:
+        sections = [("cable", scenario.cable), ("robot", scenario.robot)]
+    for module, section in sections:
+        if isinstance(section, CableSection) and not section.fmu and INNER_STEP not in section.parameters:
             continue
         known = vocabulary.of_fmu(Path(section.fmu)) if section.fmu else vocabulary.of_module(module)
         if INNER_STEP in known and known[INNER_STEP].causality == "parameter":

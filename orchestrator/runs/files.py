@@ -13,7 +13,7 @@ from orchestrator.landing.fields import interface_balance
 from orchestrator.report.page import draw_comparison, draw_run
 from orchestrator.runs.compare import Comparison, Reference
 from orchestrator.runs.record import Coupled
-from orchestrator.scenario.types import Scenario
+from orchestrator.scenario.types import LandingScenario, Scenario
 
 FIELD_UNITS = {"time": "s", "arc_length": "m", "position": "m", "tension": "N"}
 
@@ -22,11 +22,12 @@ def summary(coupled: Coupled) -> dict[str, Any]:
     """Return what ``summary.json`` holds: cost, convergence, extremes of the signals, interface work."""
     log, scenario = coupled.log, coupled.scenario
     simulated = float(log.time[-1] - log.time[0])
+    landing = scenario if isinstance(scenario, LandingScenario) else None
     return {
         "scenario": scenario.name,
         "title": scenario.title,
-        "stiffness_set": scenario.cable.stiffness_set if scenario.cable else None,
-        "robot": scenario.robot.model or scenario.robot.fmu if scenario.robot else None,
+        "stiffness_set": landing.cable.stiffness_set if landing else None,
+        "robot": landing.robot.model or landing.robot.fmu if landing else None,
         "master": coupled.master,
         "exchange": coupled.exchange or None,
         "macro_step": log.macro_step,
@@ -52,7 +53,8 @@ def energy_content(coupled: Coupled) -> dict[str, Any]:
     """Return what ``summary.json`` says of the energy."""
     if coupled.energy is not None:
         return coupled.energy.content()
-    return {"verdict": None, "missing": audit.missing(coupled.table)} if coupled.scenario.is_landing else {}
+    is_audited = isinstance(coupled.scenario, LandingScenario)
+    return {"verdict": None, "missing": audit.missing(coupled.table)} if is_audited else {}
 
 
 def _extremes(time: np.ndarray, values: np.ndarray) -> dict[str, float]:

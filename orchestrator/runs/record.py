@@ -11,7 +11,7 @@ from orchestrator.coupling.run.log import Log
 from orchestrator.coupling.run.results import Table
 from orchestrator.landing import audit
 from orchestrator.runs.components import exchange_of
-from orchestrator.scenario.types import Scenario
+from orchestrator.scenario.types import LandingScenario, Scenario
 
 LEFT_THE_GROOVE = 3
 """Value of a contact's `status` when the cable has left the groove."""
@@ -68,7 +68,7 @@ class Coupled:
     @property
     def exchange_asked(self) -> str:
         """The exchange that was asked for; cable and robot of a landing may not have what it needs."""
-        return exchange_of(self.scenario) if self.scenario.is_landing else self.exchange
+        return exchange_of(self.scenario) if isinstance(self.scenario, LandingScenario) else self.exchange
 
     @property
     def label(self) -> str:

@@ -20,7 +20,7 @@ from orchestrator.runs.compare import Reference
 from orchestrator.runs.components import only_couples, split_fields
 from orchestrator.runs.coupled import completed
 from orchestrator.runs.record import Progress
-from orchestrator.scenario.types import DEFAULT_MASTER, Scenario
+from orchestrator.scenario.types import DEFAULT_MASTER, LandingScenario, Scenario
 
 TIGHTER = 1e-2
 """The reference's tolerance by that of the runs, so that it does not show what their iterations leave."""
@@ -29,12 +29,12 @@ TIGHTER = 1e-2
 def solve_reference(scenario: Scenario, macro_steps: Iterable[float], progress: Progress = lambda _: None) -> Reference:
     """Return the reference at the communication points of all `macro_steps`."""
     steps = list(macro_steps)
-    if scenario.is_landing and landing.has_monolithic(scenario):
+    if isinstance(scenario, LandingScenario) and landing.has_monolithic(scenario):
         return _monolithic_reference(scenario, communication_times(scenario.simulation.stop_time, steps), progress)
     return _fine_reference(scenario, steps, progress)
 
 
-def _monolithic_reference(scenario: Scenario, times: np.ndarray, progress: Progress) -> Reference:
+def _monolithic_reference(scenario: LandingScenario, times: np.ndarray, progress: Progress) -> Reference:
     try:
         solution = monolithic.solve(lambda: landing.problem(scenario), times, progress=progress)
     except ModuleError as error:

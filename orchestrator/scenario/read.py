@@ -14,13 +14,15 @@ from pydantic import (
 
 from orchestrator.coupling.errors import InputError, nearest
 from orchestrator.coupling.masters.options import master_options
-from orchestrator.scenario.check import Document, Problem, check
+from orchestrator.scenario.check import Complaint, Document, check
 from orchestrator.scenario.types import (
     DEFAULT_MASTER,
     CableSection,
     Component,
     ContactSection,
+    GraphScenario,
     Landing,
+    LandingScenario,
     Provenance,
     RobotSection,
     Scalar,
@@ -34,6 +36,11 @@ NAMED_TABLES = ("parameters", "inputs", "tolerances")
 QUANTITY_KEYS = ("value", "source", "reason", "unit")
 
 
+LANDING_KEYS = ("cable", "robot", "contact", "landing")
+GRAPH_KEYS = ("components", "connections")
+MISSING: dict[str, str] = dict.fromkeys(
+    ("cable", "robot", "landing"), "missing; a landing needs cable, robot and landing, a general graph components"
+)
 SECTIONS: dict[str, type[Section]] = {
     "simulation": Simulation,
     "cable": CableSection,
@@ -64,7 +71,7 @@ def load(
     if master is not None:
         _replace_master(document, master)
     replaced = [_override(document, text) for text in overrides]
-    problems: list[Problem] = []
+    problems: list[Complaint] = []
     provenance: dict[str, Provenance] = {}
     plain = _unwrap(document, "", provenance, problems)
     _resolve_paths(plain, path.parent)
@@ -72,9 +79,7 @@ def load(
     problems += [*invalid, *check(plain, provenance)]
     if problems or scenario is None:
         raise InputError(_worded(problems, path, replaced))
-    scenario._path = path
-    scenario._provenance = provenance | {key: Provenance("command line") for key in replaced}
-    return scenario
+    return scenario.placed_at(path, provenance | {key: Provenance("command line") for key in replaced})
 
 
 def _read(path: Path) -> Document:
@@ -159,7 +164,7 @@ def _replace_master(document: Document, master: str) -> None:
     simulation["master"] = master
 
 
-def _unwrap(table: Document, prefix: str, found: dict[str, Provenance], problems: list[Problem]) -> Document:
+def _unwrap(table: Document, prefix: str, found: dict[str, Provenance], problems: list[Complaint]) -> Document:
     """Return `table` with bare values; what the quantities say about themselves goes to `found`."""
     plain: Document = {}
     for key, value in table.items():
@@ -177,14 +182,14 @@ def _unwrap(table: Document, prefix: str, found: dict[str, Provenance], problems
     return plain
 
 
-def _quantity_problems(path: str, quantity: Document) -> Iterator[Problem]:
+def _quantity_problems(path: str, quantity: Document) -> Iterator[Complaint]:
     for key in quantity:
         if key not in QUANTITY_KEYS:
-            yield Problem(f"{path}.{key}", f"unknown key{nearest(key, QUANTITY_KEYS)}")
+            yield Complaint(f"{path}.{key}", f"unknown key{nearest(key, QUANTITY_KEYS)}")
         elif key != "value" and not isinstance(quantity[key], str):
-            yield Problem(f"{path}.{key}", "must be a string")
+            yield Complaint(f"{path}.{key}", "must be a string")
     if quantity.get("source") == "assumed" and not quantity.get("reason"):
-        yield Problem(path, 'an assumed value needs a reason = "…"')
+        yield Complaint(path, 'an assumed value needs a reason = "…"')
 
 
 def _resolve_paths(document: Document, folder: Path) -> None:
@@ -197,28 +202,37 @@ def _resolve_paths(document: Document, folder: Path) -> None:
             section["fmu"] = str((folder / section["fmu"]).absolute())
 
 
-def _validated(plain: Document) -> tuple[Scenario | None, list[Problem]]:
+def _validated(plain: Document) -> tuple[Scenario | None, list[Complaint]]:
+    """Return the landing or general graph, whichever the tables are those of, or what is wrong with it."""
+    kind = GraphScenario if any(key in plain for key in GRAPH_KEYS) else LandingScenario
+    if kind is GraphScenario and any(key in plain for key in LANDING_KEYS):
+        return None, [Complaint("", "has both components and a landing; give one of them")]
     try:
-        return Scenario.model_validate(plain), []
+        return kind.model_validate(plain), []
     except ValidationError as error:
         return None, [_translated(dict(e)) for e in error.errors()]
 
 
-def _translated(error: dict[str, Any]) -> Problem:
+def _translated(error: dict[str, Any]) -> Complaint:
     """Return pydantic's `error` in our words."""
     loc = [str(key) for key in error["loc"]]
     path = ".".join(loc)
     if error["type"] == "extra_forbidden":
-        model = SECTIONS.get(loc[0], Scenario) if len(loc) > 1 else Scenario
-        return Problem(path, f"unknown key{nearest(loc[-1], model.model_fields)}")
+        return Complaint(path, f"unknown key{nearest(loc[-1], _known_keys(loc))}")
     if error["type"] == "missing":
-        return Problem(path, "missing")
+        return Complaint(path, MISSING.get(path, "missing"))
     message = error["msg"].removeprefix("Value error, ").replace("Input should be", "must be")
     shown = f"{error['input']!r} " if isinstance(error["input"], Scalar) else ""
-    return Problem(path, shown + message)
+    return Complaint(path, shown + message)
 
 
-def _worded(problems: list[Problem], file: Path, replaced: list[str]) -> Iterator[str]:
+def _known_keys(loc: list[str]) -> list[str]:
+    if len(loc) > 1:
+        return list(SECTIONS[loc[0]].model_fields)
+    return [*LandingScenario.model_fields, *GRAPH_KEYS]
+
+
+def _worded(problems: list[Complaint], file: Path, replaced: list[str]) -> Iterator[str]:
     for problem in problems:
         by_option = any(_related(problem.path, key) for key in replaced)
         place = "--set" if by_option else str(file)

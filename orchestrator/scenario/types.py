@@ -10,7 +10,7 @@ from __future__ import annotations
 from collections.abc import Mapping
 from dataclasses import dataclass
 from pathlib import Path
-from typing import Annotated, Any, Literal
+from typing import Annotated, Any, Literal, Self
 
 from pydantic import (
     AfterValidator,
@@ -49,7 +49,7 @@ NonNegative = Annotated[float, Field(ge=0.0)]
 class Simulation(Section):
     """Times in s. `tolerances`: the largest `relative_max_error` that `compare` lets pass, by signal.
 
-    `estimate`: by which second run `run` estimates the error of those signals, if any (docs/estimate.md). `timeout`: wall
+    `estimate`: by which second run `run` estimates the error of those signals, if any (docs/concepts/error.md). `timeout`: wall
     time that an FMU may take for one step or its initialisation; none: as long as it likes.
     """
 
@@ -65,7 +65,7 @@ class Simulation(Section):
 class CableSection(Section):
     """The cable: parameters by their names in the contract; `fmu` is a foreign one instead of ours.
 
-    `steps`, here and below: steps that the FMU makes in each step of the master (docs/masters.md).
+    `steps`, here and below: steps that the FMU makes in each step of the master (docs/reference/masters.md).
     """
 
     fmu: str | None = None
@@ -140,30 +140,14 @@ class Provenance:
     unit: str | None = None
 
 
-class Scenario(Section):
-    """One scenario, checked; `provenance` tells where each value comes from, by its path."""
+class _Common(Section):
+    """What every scenario has; `provenance` tells where each value comes from, by its path."""
 
     title: str
     simulation: Simulation
     master: Settings = {}
-    cable: CableSection | None = None
-    robot: RobotSection | None = None
-    contact: ContactSection = ContactSection()
-    landing: Landing | None = None
-    components: dict[str, Component] = {}
-    connections: list[str] = []
     _path: Path = PrivateAttr(default=Path("scenario.toml"))
     _provenance: dict[str, Provenance] = PrivateAttr(default_factory=dict)
-
-    @model_validator(mode="after")
-    def _one_kind(self) -> Scenario:
-        parts = {"cable": self.cable, "robot": self.robot, "landing": self.landing}
-        missing = [name for name, part in parts.items() if part is None]
-        if self.components and len(missing) < len(parts):
-            raise ValueError("has both components and a landing; give one of them")
-        if not self.components and missing:
-            raise ValueError(f"{', '.join(missing)}: missing; a landing needs cable, robot and landing")
-        return self
 
     @property
     def name(self) -> str:
@@ -180,16 +164,34 @@ class Scenario(Section):
         """Source, reason and unit of every value, by its path."""
         return self._provenance
 
-    @property
-    def is_landing(self) -> bool:
-        """Whether this is a landing and not a general graph."""
-        return self.landing is not None
+    def placed_at(self, path: Path, provenance: dict[str, Provenance]) -> Self:
+        """Note the file that the scenario comes from, and where each of its values does; return it."""
+        self._path, self._provenance = path, provenance
+        return self
 
-    def changed(self, options: Settings | None = None, **simulation: Any) -> Scenario:
+    def changed(self, options: Settings | None = None, **simulation: Any) -> Self:
         """Return a copy with other simulation settings (macro_step, …) and master `options`, checked again."""
         document = self.model_dump()
         document["simulation"] |= simulation
         document["master"] = document["master"] if options is None else options
-        copy = Scenario.model_validate(document)
-        copy._path, copy._provenance = self._path, self._provenance
-        return copy
+        return type(self).model_validate(document).placed_at(self._path, self._provenance)
+
+
+class LandingScenario(_Common):
+    """A robot comes down on a cable: cable, robot, one contact a wheel, and where they meet."""
+
+    cable: CableSection
+    robot: RobotSection
+    contact: ContactSection = ContactSection()
+    landing: Landing
+
+
+class GraphScenario(_Common):
+    """A general graph: any FMUs by name, and what is connected to what (``"a.x -> b.u"``)."""
+
+    components: Annotated[dict[str, Component], Field(min_length=1)]
+    connections: list[str] = []
+
+
+Scenario = LandingScenario | GraphScenario
+"""One scenario, checked; `isinstance` tells which kind."""
