@@ -1,8 +1,5 @@
 """The cable at rest, held against independent solutions (`verification/cable`), and where there is none."""
 
-import re
-from pathlib import Path
-
 import numpy as np
 import pytest
 from hypothesis import given, settings
@@ -116,11 +113,11 @@ def test_equilibrium_is_found(more):
     [
         ({"unstretched_length": 240.0, "clamped": True}, "set grading"),
         ({"gravity": 0.0, "unstretched_length": 205.0}, "slack cable without gravity"),
-        ({"axial_stiffness": 0.0}, "axial_stiffness = 0 must be positive"),
+        ({"axial_stiffness": 0.0}, "axial_stiffness = 0 N must be greater than 0"),
         ({"bending_stiffness": float("nan")}, "bending_stiffness = nan"),
-        ({"n_elements": 0}, "n_elements = 0"),
-        ({"spectral_radius": 1.5}, "spectral_radius = 1.5"),
-        ({"grading": 0.5}, "grading = 0.5"),
+        ({"n_elements": 0}, "n_elements = 0 must be at least 1 and at most 5000"),
+        ({"spectral_radius": 1.5}, "spectral_radius = 1.5 must be at least 0 and at most 1"),
+        ({"grading": 0.5}, "grading = 0.5 must be at least 1"),
         ({"sag": 0.01}, "sag: 0.01 m cannot be reached"),
     ],
     ids=lambda value: value if isinstance(value, str) else "",
@@ -145,11 +142,3 @@ def test_defaults_are_table1():
     made = Cable()
     assert {name: made[name] for name in TABLE1} == TABLE1
     assert PHYSICAL["axial_stiffness"] == 8.12e7 / 4 and RIG["span"] == 10.0
-
-
-def test_readme_names_every_parameter_and_output():
-    text = (Path(__file__).parents[1] / "fmus" / "cable" / "README.md").read_text()
-    for variable in Cable.table.variables:
-        name = re.sub(r"\.[xyz]$", "", variable.name)
-        name = re.sub(r"^port\[\d\]", "port[k]", re.sub(r"^shape\[\d+\]", "shape[i]", name))
-        assert f"`{name}`" in text, variable.name

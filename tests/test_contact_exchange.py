@@ -465,9 +465,9 @@ def test_jump_up_is_open_and_passing_through_the_axle_is_left():
 @pytest.mark.parametrize(
     ("name", "value", "cure"),
     [
-        ("stiffness", -1.0, "above zero"),
-        ("damping", -1.0, "zero or more"),
-        ("exponent", 0.5, ">= 1"),
+        ("stiffness", -1.0, "greater than 0"),
+        ("damping", -1.0, "at least 0"),
+        ("exponent", 0.5, "at least 1; a smaller one makes the wall infinitely stiff"),
         ("groove_angle", 100.0, "degrees"),
         ("wheel_radius", 0.02, "enlarge"),
         ("initial.s", math.inf, "finite"),

@@ -20,10 +20,9 @@ from orchestrator.coupling.run.log import Log
 from orchestrator.coupling.run.simulate import simulate
 from orchestrator.coupling.stepping.interpolation import Between, Loads
 from orchestrator.coupling.stepping.jacobian import OwnDerivatives
-from tests.fmus import MILD, compiled, compiler, oscillator
-from tests.test_fmu import described, started
+from tests.fmus import MILD, compiled, described, needs_compiler, oscillator, started
 
-pytestmark = pytest.mark.skipif(compiler() is None, reason="no C compiler on this machine")
+pytestmark = needs_compiler
 
 NONE, OVER_STEP, AT_INSTANT, WRONG, NOT_A_NUMBER, DISCARD, ERROR, FATAL = 0, 1, 2, 3, 4, 12, 13, 14
 A = np.array([[-3.0, 1.0, 0.5], [1.0, -4.0, 1.0], [0.2, 1.0, -2.0]])

@@ -24,8 +24,8 @@ from orchestrator.runs.record import Coupled
 from orchestrator.scenario.read import load
 from orchestrator.scenario.types import LandingScenario, Scenario
 from tests.fmus import fmu
-from tests.test_cli import LANDING, OSCILLATOR, exact_oscillator
-from tests.test_masters import ITERATED, run
+from tests.scenarios import LANDING, OSCILLATOR, exact_oscillator
+from tests.systems import ITERATED, run
 
 RECORD = ["a.position", "a.velocity", "b.position", "b.velocity"]
 

@@ -18,14 +18,13 @@ import pytest
 from fmpy.fmi1 import FMICallException
 from fmpy.validation import validate_fmu
 
-TESTS = Path(__file__).resolve().parent
-sys.path.insert(0, str(TESTS / "modules"))
-
 from fmus.face.build import build_fmu, ensure_fmu, ensure_fmus, is_stale, rename_imports
 from fmus.module.recipe import FmuRecipe
 from fmus.module.units import unit
 from fmus.module.variables import ModuleError
-from tests.fmi import Instance  # noqa: E402
+from tests.fmi import Instance
+
+TESTS = Path(__file__).resolve().parent
 
 RECIPE = FmuRecipe("oscillator", "oscillator.module:Oscillator", "Damped oscillator", {"n_forces": 2}, {"damping": 0.3})
 FATAL, DISCARD = 4, 2

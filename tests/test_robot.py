@@ -477,14 +477,17 @@ def test_whole_number_of_inner_steps():
 @pytest.mark.parametrize(
     ("settings", "message"),
     [
-        ({"mass": -1.0}, "mass: -1 kg is not positive"),
-        ({"mass": math.nan}, "mass: nan is not a finite number"),
-        ({"inertia.xx": -5.0}, "must be positive"),
+        ({"mass": -1.0}, "robot: mass = -1 kg must be greater than 0"),
+        ({"mass": math.nan}, "mass = nan kg is not a finite number"),
+        ({"inertia.xx": -5.0}, "inertia.xx = -5 kg.m2 must be greater than 0"),
         ({"inertia.xy": 6.0}, "must be positive"),
         ({"inertia.zz": 20.0}, "those of no body"),
-        ({"integration_step": 0.0}, "integration_step: 0 s is not positive"),
+        ({"integration_step": 0.0}, "integration_step = 0 s must be greater than 0"),
         ({"wheel[1].axle_direction.x": 0.0}, r"wheel\[1\].axle_direction: has no length"),
-        ({"wheel[1].braked": False, "wheel[1].inertia": 0.0}, r"wheel\[1\].inertia: 0 kg.m2"),
+        (
+            {"wheel[1].braked": False, "wheel[1].inertia": 0.0},
+            r"wheel\[1\].inertia = 0 kg.m2 of a free wheel must be greater than 0",
+        ),
         ({"wheel[1].braked": False, "wheel[1].inertia": 9.0}, "exceeds the whole robot's"),
         ({"n_wheels": 2}, "n_wheels: this model has 1"),
     ],

@@ -5,7 +5,6 @@ Expected values: the analytic solution of the oscillator; the monolithic solutio
 
 from __future__ import annotations
 
-from pathlib import Path
 from types import SimpleNamespace
 
 import numpy as np
@@ -16,10 +15,9 @@ from orchestrator.runs.compare import held_against
 from orchestrator.runs.coupled import run_coupled
 from orchestrator.runs.reference import solve_reference
 from orchestrator.scenario.read import load
-from tests.test_cli import LANDING
-from tests.test_masters import IMPLICIT, MILD, POSITIONS, faulty_oscillator, oscillator, oscillator_solution, run
-
-DROP = Path(LANDING).parent / "drop_5cm.toml"
+from tests.fmus import MILD, oscillator, oscillator_solution
+from tests.scenarios import DROP
+from tests.systems import IMPLICIT, POSITIONS, faulty_oscillator, run
 
 
 def controlled(master: str, tolerance: float):

@@ -10,46 +10,65 @@ from fmus.cable.assembly import Model, interpolate
 from fmus.cable.dynamics import N_PORTS
 from fmus.cable.statics import equilibrium, mesh_model
 from fmus.kernels.time_integration import collocation, generalized_alpha
-from fmus.module.variables import ModuleError, Variable, VariableTable, vector
+from fmus.module.variables import (
+    NON_NEGATIVE,
+    POSITIVE,
+    Bounds,
+    ModuleError,
+    Variable,
+    VariableTable,
+    check_bounds,
+    parameter,
+    vector,
+)
 
 N_SHAPE = 41
 """Points at which the shape of the cable is shown, equally spaced in unstretched arc length."""
 
 
 def _parameters() -> list[Variable]:
-    def real(name: str, unit: str, start: float, description: str) -> Variable:
-        return Variable(name, "parameter", unit, start, description)
-
     return [
-        real("span", "m", 200.0, "horizontal distance of the supports"),
-        real("level_difference", "m", 0.0, "height of the right support above the left one"),
-        real("unstretched_length", "m", 200.0, "unstretched length of the cable"),
-        real(
+        parameter("span", "m", 200.0, "horizontal distance of the supports", POSITIVE),
+        parameter("level_difference", "m", 0.0, "height of the right support above the left one"),
+        parameter("unstretched_length", "m", 200.0, "unstretched length of the cable", POSITIVE),
+        parameter(
             "sag",
             "m",
             0.0,
             "sag at midspan wanted; 0: given by unstretched_length, else that is found from the sag",
+            NON_NEGATIVE,
         ),
-        Variable("n_elements", "parameter", "1", 20, "number of elements", kind="integer"),
-        real("grading", "1", 1.0, "ratio of the longest to the shortest element; 1: equal elements"),
-        real(
+        Variable(
+            "n_elements",
+            "parameter",
+            "1",
+            20,
+            "number of elements",
+            kind="integer",
+            bounds=Bounds(ge=1, le=5000),
+        ),
+        parameter(
+            "grading", "1", 1.0, "ratio of the longest to the shortest element; 1: equal elements", Bounds(ge=1.0)
+        ),
+        parameter(
             "grading_position",
             "m",
             -1.0,
             "arc length of a refined point besides the supports; negative: none",
         ),
-        real("axial_stiffness", "N", 8.12e7, "EA"),
-        real("bending_stiffness", "N.m2", 6580.0, "EI"),
-        real("linear_density", "kg/m", 0.91, "mass per unstretched length"),
-        real("damping_time", "s", 0.005, "Kelvin-Voigt damping: ratio of viscosity to stiffness"),
-        real("gravity", "m/s2", 9.8, "acceleration of gravity, towards -z"),
+        parameter("axial_stiffness", "N", 8.12e7, "EA", POSITIVE),
+        parameter("bending_stiffness", "N.m2", 6580.0, "EI", NON_NEGATIVE),
+        parameter("linear_density", "kg/m", 0.91, "mass per unstretched length", POSITIVE),
+        parameter("damping_time", "s", 0.005, "Kelvin-Voigt damping: ratio of viscosity to stiffness", NON_NEGATIVE),
+        parameter("gravity", "m/s2", 9.8, "acceleration of gravity, towards -z", NON_NEGATIVE),
         Variable("clamped", "parameter", "1", False, "supports hold the transverse slope too", kind="boolean"),
-        real("integration_step", "s", 0.0025, "longest inner step"),
-        real(
+        parameter("integration_step", "s", 0.0025, "longest inner step", POSITIVE),
+        parameter(
             "spectral_radius",
             "1",
             0.9,
             "spectral radius of the time integration at infinite frequency, 0 to 1",
+            Bounds(ge=0.0, le=1.0),
         ),
         Variable(
             "integrator",
@@ -140,7 +159,7 @@ class Cable:
 
     def initialize(self, t: float) -> None:
         """Mesh the cable, find its static equilibrium, start the state there; raises `ModuleError`."""
-        self._check()
+        check_bounds(self.table, self.values, "cable")
         if self["sag"] > 0.0:
             self.values[self.table.index["unstretched_length"]] = self._length_for_sag()
         self.model, q = self._rest(self["unstretched_length"])
@@ -194,22 +213,6 @@ class Cable:
                 f"cable: sag: {self['sag']:g} m cannot be reached; "
                 "check it against span, axial_stiffness and linear_density"
             ) from None
-
-    def _check(self) -> None:
-        positive = ("span", "unstretched_length", "axial_stiffness", "linear_density", "integration_step")
-        for name in (*positive, "bending_stiffness", "damping_time", "sag"):
-            value = self[name]
-            if not np.isfinite(value) or value < 0.0 or (name in positive and value == 0.0):
-                bound = "positive" if name in positive else "zero or positive"
-                raise ModuleError(f"cable: {name} = {value:g} must be {bound} and finite")
-        if not np.all(np.isfinite(self.values[: len(self.table.names("parameter"))])):
-            raise ModuleError("cable: a parameter is not a finite number; set it to one")
-        if not 1 <= self["n_elements"] <= 5000:
-            raise ModuleError(f"cable: n_elements = {self['n_elements']:g} must be between 1 and 5000")
-        if not 0.0 <= self["spectral_radius"] <= 1.0:
-            raise ModuleError(f"cable: spectral_radius = {self['spectral_radius']:g} must be between 0 and 1")
-        if self["grading"] < 1.0:
-            raise ModuleError(f"cable: grading = {self['grading']:g} must be 1 (equal elements) or more")
 
     def step(self, t: float, h: float) -> None:
         """Advance from `t` by the macro step `h`; raises `ModuleError` where Newton's method fails."""

@@ -8,46 +8,64 @@ import numpy as np
 
 from fmus.contact import exchange
 from fmus.contact.law import NO_AXLE, NO_TANGENT, NOT_FINITE, OPEN, OUT_SIZE, law_parameters
-from fmus.module.variables import ModuleError, Value, Variable, VariableTable, vector
+from fmus.module.variables import (
+    NON_NEGATIVE,
+    POSITIVE,
+    Bounds,
+    ModuleError,
+    Variable,
+    VariableTable,
+    check_bounds,
+    parameter,
+    vector,
+)
 
 SAMPLES = 8
 """Gauss points of a macro step, in time (see README)."""
 
-_POSITIVE = (
-    "stiffness",
-    "exponent",
-    "wheel_radius",
-    "groove_angle",
-    "groove_width",
-    "cable_diameter",
-    "max_contact_length",
-    "tangential_stiffness",
-)
-_NOT_NEGATIVE = ("damping", "friction_coefficient", "tangential_damping")
-
 
 def _parameters() -> list[Variable]:
-    def real(name: str, unit: str, start: Value, description: str) -> Variable:
-        return Variable(name, "parameter", unit, start, description)
+    touch = Bounds(ge=1.0, hint="a smaller one makes the wall infinitely stiff at touch")
+    angle = Bounds(gt=0.0, lt=math.pi, hint="is it given in degrees?")
 
     return [
-        real(
+        parameter(
             "stiffness",
             "N/m^n",
             1e8,
             "stiffness k of one groove wall, force = k * penetration^n; n = exponent",
+            POSITIVE,
         ),
-        real("exponent", "1", 2.5, "exponent n of the penetration"),
-        real("damping", "s/m", 1.0, "Hunt-Crossley damping D, factor 1 + D * penetration rate"),
-        real("friction_coefficient", "1", 0.7, "Coulomb friction coefficient on the sum of both walls' forces"),
-        real("wheel_radius", "m", 0.075, "radius of the wheel's rim"),
-        real("groove_angle", "rad", 1.7453292519943295, "full opening angle of the groove"),
-        real("groove_width", "m", 0.08, "width of the groove at the rim"),
-        real("cable_diameter", "m", 0.018, "diameter of the cable"),
-        real("max_contact_length", "m", 0.06, "longest contact length l0; stiffness / l0 acts per unit length"),
-        real("tangential_stiffness", "N/m", 1e6, "stiffness of the friction bristle before it slides"),
-        real("tangential_damping", "N.s/m", 1e3, "damping of the friction bristle before it slides"),
-        real("initial.s", "m", 0.0, "arc length of the contact point on the unstretched cable at the start"),
+        parameter("exponent", "1", 2.5, "exponent n of the penetration", touch),
+        parameter("damping", "s/m", 1.0, "Hunt-Crossley damping D, factor 1 + D * penetration rate", NON_NEGATIVE),
+        parameter(
+            "friction_coefficient",
+            "1",
+            0.7,
+            "Coulomb friction coefficient on the sum of both walls' forces",
+            NON_NEGATIVE,
+        ),
+        parameter("wheel_radius", "m", 0.075, "radius of the wheel's rim", POSITIVE),
+        parameter("groove_angle", "rad", 1.7453292519943295, "full opening angle of the groove", angle),
+        parameter("groove_width", "m", 0.08, "width of the groove at the rim", POSITIVE),
+        parameter("cable_diameter", "m", 0.018, "diameter of the cable", POSITIVE),
+        parameter(
+            "max_contact_length", "m", 0.06, "longest contact length l0; stiffness / l0 acts per unit length", POSITIVE
+        ),
+        parameter("tangential_stiffness", "N/m", 1e6, "stiffness of the friction bristle before it slides", POSITIVE),
+        parameter(
+            "tangential_damping",
+            "N.s/m",
+            1e3,
+            "damping of the friction bristle before it slides",
+            NON_NEGATIVE,
+        ),
+        parameter(
+            "initial.s",
+            "m",
+            0.0,
+            "arc length of the contact point on the unstretched cable at the start",
+        ),
         Variable(
             "exchange",
             "parameter",
@@ -201,23 +219,8 @@ class Contact:
 
     def check_parameters(self) -> None:
         """Raise `ModuleError` naming the first parameter that makes no sense."""
-        for name in (*_POSITIVE, *_NOT_NEGATIVE, "initial.s"):
-            value = self._value(name)
-            if not math.isfinite(value):
-                raise ModuleError(f"contact: {name} = {value:g} is not a finite number; set it to one")
-            if name in _POSITIVE and value <= 0.0:
-                raise ModuleError(f"contact: {name} = {value:g} must be positive; set it above zero")
-            if name in _NOT_NEGATIVE and value < 0.0:
-                raise ModuleError(f"contact: {name} = {value:g} must not be negative; set it to zero or more")
-        self._check_groove()
-
-    def _check_groove(self) -> None:
-        exponent, angle = self._value("exponent"), self._value("groove_angle")
-        if exponent < 1.0:
-            raise ModuleError(f"contact: exponent = {exponent:g} makes the wall infinitely stiff at touch; use >= 1")
-        if angle >= math.pi:
-            raise ModuleError(f"contact: groove_angle = {angle:g} rad must be below pi; is it given in degrees?")
-        depth = 0.5 * self._value("groove_width") / math.tan(0.5 * angle)
+        check_bounds(self.table, self.values, "contact")
+        depth = 0.5 * self._value("groove_width") / math.tan(0.5 * self._value("groove_angle"))
         if depth >= self._value("wheel_radius"):
             raise ModuleError(
                 f"contact: wheel_radius = {self._value('wheel_radius'):g} m is not more than the"

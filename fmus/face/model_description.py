@@ -100,9 +100,17 @@ def _add_variables(root: Element, table: VariableTable, values: np.ndarray) -> N
         typed = SubElement(node, XML_TYPES[variable.kind])
         if variable.kind == "real":
             typed.set("unit", variable.unit)
+        _add_bounds(typed, variable)
         if variable.causality != "output":
             start = variable.decode(values[reference])
             typed.set("start", str(start).lower() if isinstance(start, bool) else str(start))
+
+
+def _add_bounds(typed: Element, variable: Variable) -> None:
+    """Add min and max: FMI 2.0 knows no exclusive bound, so that one stands there as if it were allowed."""
+    for name, bound in (("min", variable.bounds.lowest), ("max", variable.bounds.highest)):
+        if bound is not None:
+            typed.set(name, str(int(bound) if variable.kind == "integer" else float(bound)))
 
 
 def _add_structure(root: Element, table: VariableTable) -> None:
@@ -135,7 +143,7 @@ def documentation(recipe: FmuRecipe, table: VariableTable, values: np.ndarray, r
 A step that fails is discarded and leaves the FMU as it was; a failed initialisation is fatal; the log says
 why.</p>
 <table>
-<tr><th>name</th><th>causality</th><th>type</th><th>unit</th><th>start</th><th>description</th></tr>
+<tr><th>name</th><th>causality</th><th>type</th><th>unit</th><th>start</th><th>bounds</th><th>description</th></tr>
 {rows}
 </table>
 <pre>
@@ -152,5 +160,5 @@ def _row(variable: Variable, number: float) -> str:
     if variable.choices:
         description += f" ({', '.join(variable.choices)})"
     unit = variable.unit if variable.kind == "real" else ""
-    cells = (variable.name, variable.causality, variable.kind, unit, start, description)
+    cells = (variable.name, variable.causality, variable.kind, unit, start, str(variable.bounds), description)
     return "<tr>" + "".join(f"<td>{html.escape(cell)}</td>" for cell in cells) + "</tr>"

@@ -22,7 +22,7 @@ from typing import Any
 
 import numba
 
-from fmus.kernels.cache import prune, used, user_folder
+from fmus.kernels.cache import prune, remove, used, user_folder
 
 LIBRARIES = {*sys.stdlib_module_names, "numba", "numpy", "scipy", "llvmlite"}
 """What is not looked into: their versions, not their sources, decide over the compiled code."""
@@ -78,7 +78,15 @@ def code_folder(module: str) -> Path:
     folder = parent / f"{module}-{digest.hexdigest()[:16]}"
     if not folder.is_dir():  # Numba makes it when there is something to keep
         prune(parent)
+        _remove_former(parent)
     return used(folder)
+
+
+def _remove_former(parent: Path) -> None:
+    """Remove what former versions have compiled beside their sources and beside `parent`."""
+    for place in (Path(__file__).parents[1] / "__pycache__", parent.parent):
+        for folder in place.glob("numba-*"):
+            remove(folder)
 
 
 def sources(module: str) -> dict[str, bytes]:

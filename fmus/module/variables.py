@@ -6,6 +6,7 @@ index in the table is its FMI value reference and its place in the module's flat
 
 from __future__ import annotations
 
+import math
 import operator
 from collections.abc import Iterable, Mapping
 from dataclasses import dataclass
@@ -26,13 +27,25 @@ class ModuleError(Exception):
 class Bounds:
     """Where a number may lie: ``ge <= value <= le``, ``gt < value < lt``; None is no bound.
 
-    Written once, in the variable table: model description, scenario and module read them there.
+    Written once, in the variable table: model description, scenario and module read them there. `hint` is what to
+    tell someone whose value lies elsewhere.
     """
 
     ge: float | None = None
     gt: float | None = None
     le: float | None = None
     lt: float | None = None
+    hint: str = ""
+
+    @property
+    def lowest(self) -> float | None:
+        """Return the lower bound, whether it is allowed itself or not; None if there is none."""
+        return self.ge if self.gt is None else self.gt
+
+    @property
+    def highest(self) -> float | None:
+        """Return the upper bound, whether it is allowed itself or not; None if there is none."""
+        return self.le if self.lt is None else self.lt
 
     def admit(self, value: float) -> bool:
         """Return whether `value` is within the bounds; NaN never is, infinity only without a bound."""
@@ -45,6 +58,7 @@ class Bounds:
         return " and ".join(f"{word} {bound:g}" for bound, word in words if bound is not None)
 
 
+UNBOUNDED = Bounds()
 POSITIVE = Bounds(gt=0.0)
 NON_NEGATIVE = Bounds(ge=0.0)
 
@@ -76,7 +90,7 @@ class Variable:
     choices: tuple[str, ...] = ()
     discrete: bool = False
     feedthrough: tuple[str, ...] = ()
-    bounds: Bounds = Bounds()
+    bounds: Bounds = UNBOUNDED
 
     def encode(self, value: Value) -> float:
         """Return `value` as the number kept in the flat array; raise `ModuleError` if it has no place
@@ -137,6 +151,28 @@ class VariableTable:
             if name not in self.index:
                 raise ModuleError(f"{name}: no such variable")
             values[self.index[name]] = self[name].encode(value)
+
+
+def check_bounds(table: VariableTable, values: np.ndarray, place: str) -> None:
+    """Raise `ModuleError` naming the first parameter of `place` that is not finite or out of its bounds.
+
+    Parameters
+    ----------
+    values : (len(table),) float64, the module's flat array
+    """
+    for name in table.names("parameter"):
+        value, variable = float(values[table.index[name]]), table[name]
+        unit = "" if variable.unit == "1" else f" {variable.unit}"
+        if not math.isfinite(value):
+            raise ModuleError(f"{place}: {name} = {value:g}{unit} is not a finite number; set it to one")
+        if not variable.bounds.admit(value):
+            hint = variable.bounds.hint and f"; {variable.bounds.hint}"
+            raise ModuleError(f"{place}: {name} = {value:g}{unit} must be {variable.bounds}{hint}")
+
+
+def parameter(name: str, unit: str, start: Value, description: str, bounds: Bounds = UNBOUNDED) -> Variable:
+    """Return a real parameter."""
+    return Variable(name, "parameter", unit, start, description, bounds=bounds)
 
 
 def vector(

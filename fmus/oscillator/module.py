@@ -13,7 +13,7 @@ import math
 import numpy as np
 
 from fmus.kernels.jit import kernel
-from fmus.module.variables import ModuleError, Variable, VariableTable
+from fmus.module.variables import NON_NEGATIVE, POSITIVE, Variable, VariableTable, check_bounds, parameter
 
 TERMS = 18
 """Terms of the exponential series; with steps no longer than half the shortest time scale it is exact to round-off."""
@@ -48,13 +48,13 @@ def advance(z, term, mass, stiffness, damping, coupling, coupling_damping, h):
 def _variables() -> list[Variable]:
     neighbour = ("neighbour.position", "neighbour.velocity")
     return [
-        Variable("mass", "parameter", "kg", 1.0, "mass m"),
-        Variable("stiffness", "parameter", "N/m", 1.0, "spring to the ground k"),
-        Variable("damping", "parameter", "N.s/m", 0.0, "damper to the ground d"),
-        Variable("coupling_stiffness", "parameter", "N/m", 0.0, "spring to the neighbour k_c"),
-        Variable("coupling_damping", "parameter", "N.s/m", 0.0, "damper to the neighbour d_c"),
-        Variable("initial_position", "parameter", "m", 0.0, "position at the start"),
-        Variable("initial_velocity", "parameter", "m/s", 0.0, "velocity at the start"),
+        parameter("mass", "kg", 1.0, "mass m", POSITIVE),
+        parameter("stiffness", "N/m", 1.0, "spring to the ground k", NON_NEGATIVE),
+        parameter("damping", "N.s/m", 0.0, "damper to the ground d", NON_NEGATIVE),
+        parameter("coupling_stiffness", "N/m", 0.0, "spring to the neighbour k_c", NON_NEGATIVE),
+        parameter("coupling_damping", "N.s/m", 0.0, "damper to the neighbour d_c", NON_NEGATIVE),
+        parameter("initial_position", "m", 0.0, "position at the start"),
+        parameter("initial_velocity", "m/s", 0.0, "velocity at the start"),
         Variable(
             "exchange",
             "parameter",
@@ -101,11 +101,7 @@ class Oscillator:
 
     def initialize(self, t: float) -> None:
         """Check the parameters and start; raises `ModuleError`."""
-        if not self["mass"] > 0.0:
-            raise ModuleError(f"oscillator: mass = {self['mass']:g} kg must be positive")
-        for name in ("stiffness", "damping", "coupling_stiffness", "coupling_damping"):
-            if not self[name] >= 0.0:
-                raise ModuleError(f"oscillator: {name} = {self[name]:g} must not be negative")
+        check_bounds(self.table, self.values, "oscillator")
         self.state[:] = self["initial_position"], self["initial_velocity"], self["neighbour.position"]
         self._write(self.state[0], self._force(), 0.0)
 

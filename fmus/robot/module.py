@@ -7,7 +7,17 @@ import math
 import numpy as np
 
 from fmus.kernels.rotations import follow_euler, from_euler, rotate
-from fmus.module.variables import ModuleError, Variable, VariableTable, vector
+from fmus.module.variables import (
+    NON_NEGATIVE,
+    POSITIVE,
+    Bounds,
+    ModuleError,
+    Variable,
+    VariableTable,
+    check_bounds,
+    parameter,
+    vector,
+)
 from fmus.robot import rigid_body
 
 ROUND_OFF = 1e-9
@@ -15,28 +25,35 @@ ROUND_OFF = 1e-9
 
 
 def _body_parameters(n_wheels: int) -> list[Variable]:
-    real = [
-        ("mass", "kg", 38.0, "mass, wheels included"),
-        (
+    tensor = "of the inertia tensor (minus the product of inertia)"
+    return [
+        Variable(
+            "n_wheels",
+            "parameter",
+            "1",
+            n_wheels,
+            "number of wheels; fixed by the model",
+            kind="integer",
+            bounds=Bounds(ge=1, le=rigid_body.MAX_WHEELS),
+        ),
+        parameter("mass", "kg", 38.0, "mass, wheels included", POSITIVE),
+        parameter(
             "inertia.xx",
             "kg.m2",
             5.42,
             "moment of inertia about the centre of mass, wheels included as if fixed",
+            POSITIVE,
         ),
-        ("inertia.yy", "kg.m2", 5.42, "moment of inertia about the centre of mass"),
-        ("inertia.zz", "kg.m2", 8.5, "moment of inertia about the centre of mass"),
-        ("inertia.xy", "kg.m2", 0.0, "entry xy of the inertia tensor (minus the product of inertia)"),
-        ("inertia.xz", "kg.m2", 0.0, "entry xz of the inertia tensor (minus the product of inertia)"),
-        ("inertia.yz", "kg.m2", 0.0, "entry yz of the inertia tensor (minus the product of inertia)"),
-        ("gravity", "m/s2", 9.8, "gravitational acceleration, along -Z"),
-        ("integration_step", "s", 1e-3, "longest inner step"),
-        ("initial.roll", "rad", 0.0, "initial angle about x"),
-        ("initial.pitch", "rad", 0.0, "initial angle about y"),
-        ("initial.yaw", "rad", 0.0, "initial angle about z"),
-    ]
-    return [
-        Variable("n_wheels", "parameter", "1", n_wheels, "number of wheels; fixed by the model", kind="integer"),
-        *(Variable(name, "parameter", unit, start, text) for name, unit, start, text in real),
+        parameter("inertia.yy", "kg.m2", 5.42, "moment of inertia about the centre of mass", POSITIVE),
+        parameter("inertia.zz", "kg.m2", 8.5, "moment of inertia about the centre of mass", POSITIVE),
+        parameter("inertia.xy", "kg.m2", 0.0, f"entry xy {tensor}"),
+        parameter("inertia.xz", "kg.m2", 0.0, f"entry xz {tensor}"),
+        parameter("inertia.yz", "kg.m2", 0.0, f"entry yz {tensor}"),
+        parameter("gravity", "m/s2", 9.8, "gravitational acceleration, along -Z", NON_NEGATIVE),
+        parameter("integration_step", "s", 1e-3, "longest inner step", POSITIVE),
+        parameter("initial.roll", "rad", 0.0, "initial angle about x"),
+        parameter("initial.pitch", "rad", 0.0, "initial angle about y"),
+        parameter("initial.yaw", "rad", 0.0, "initial angle about z"),
         *vector("center_of_mass", "parameter", "m", "centre of mass from b, in B", (0.0, 0.0, -0.1)),
         *vector("initial.position", "parameter", "m", "initial position of b"),
         *vector("initial.velocity", "parameter", "m/s", "initial velocity of b"),
@@ -49,7 +66,13 @@ def _wheel_parameters(wheel: str) -> list[Variable]:
         *vector(f"{wheel}.mount", "parameter", "m", "wheel centre from b, in B", (0.0, 0.0, 0.2152)),
         *vector(f"{wheel}.axle_direction", "parameter", "1", "axle in B, of any length", (1.0, 0.0, 0.0)),
         Variable(f"{wheel}.braked", "parameter", "1", True, "fixed to the body, not free to spin", kind="boolean"),
-        Variable(f"{wheel}.inertia", "parameter", "kg.m2", 5e-3, "spin inertia about the axle; used if free"),
+        parameter(
+            f"{wheel}.inertia",
+            "kg.m2",
+            5e-3,
+            "spin inertia about the axle; used if free, and positive then",
+            NON_NEGATIVE,
+        ),
     ]
 
 
@@ -113,20 +136,6 @@ def _vector(values: np.ndarray, table: VariableTable, name: str) -> np.ndarray:
     return values[table.indices(f"{name}.{axis}" for axis in "xyz")]
 
 
-def _positive(values: np.ndarray, table: VariableTable, name: str) -> float:
-    value = float(values[table.index[name]])
-    if not (math.isfinite(value) and value > 0.0):
-        raise ModuleError(f"{name}: {value:g} {table[name].unit} is not positive; give a value above 0")
-    return value
-
-
-def _check_finite(values: np.ndarray, table: VariableTable) -> None:
-    for name in table.names("parameter"):
-        value = values[table.index[name]]
-        if not math.isfinite(value):
-            raise ModuleError(f"{name}: {value} is not a finite number; give one in {table[name].unit}")
-
-
 def inertia_tensor(values: np.ndarray, table: VariableTable) -> np.ndarray:
     """Return the inertia tensor about G in B (3, 3), kg m²; raise `ModuleError` if no body can have it."""
     xx, yy, zz, xy, xz, yz = (values[table.index[f"inertia.{c}"]] for c in ("xx", "yy", "zz", "xy", "xz", "yz"))
@@ -152,9 +161,16 @@ def _wheel_row(values: np.ndarray, table: VariableTable, wheel: str) -> np.ndarr
     if length == 0.0:
         raise ModuleError(f"{wheel}.axle_direction: has no length; give a direction such as 1, 0, 0")
     free = not values[table.index[f"{wheel}.braked"]]
-    spin_inertia = _positive(values, table, f"{wheel}.inertia") if free else 1.0
+    spin_inertia = _spin_inertia(values, table, wheel) if free else 1.0
     mount = _vector(values, table, f"{wheel}.mount") - _vector(values, table, "center_of_mass")
     return np.array([*mount, *(axle / length), spin_inertia, float(free)])
+
+
+def _spin_inertia(values: np.ndarray, table: VariableTable, wheel: str) -> float:
+    value = float(values[table.index[f"{wheel}.inertia"]])
+    if value <= 0.0:
+        raise ModuleError(f"robot: {wheel}.inertia = {value:g} kg.m2 of a free wheel must be greater than 0")
+    return value
 
 
 def body_parameters(values: np.ndarray, table: VariableTable) -> np.ndarray:
@@ -166,12 +182,12 @@ def body_parameters(values: np.ndarray, table: VariableTable) -> np.ndarray:
     table : of `robot_table`
     """
     rb = rigid_body
-    _check_finite(values, table)
+    check_bounds(table, values, "robot")
     n_wheels = int(table["n_wheels"].start)
     if values[table.index["n_wheels"]] != n_wheels:
         raise ModuleError(f"n_wheels: this model has {n_wheels}; take a model of a robot with the wheels wanted")
     prm = np.zeros(rb.N_PARAMETERS)
-    prm[rb.MASS] = _positive(values, table, "mass")
+    prm[rb.MASS] = values[table.index["mass"]]
     prm[rb.GRAVITY] = values[table.index["gravity"]]
     prm[rb.N_WHEELS] = n_wheels
     prm[rb.B_FROM_G : rb.B_FROM_G + 3] = -_vector(values, table, "center_of_mass")
@@ -233,7 +249,7 @@ class Robot:
         """Check the parameters and write state and outputs; the motion before `t` counts as rest."""
         rb = rigid_body
         self._prm = body_parameters(self.values, self.table)
-        self._inner_step = _positive(self.values, self.table, "integration_step")
+        self._inner_step = float(self.values[self.table.index["integration_step"]])
         self.state[:] = 0.0
         self.state[: rb.RIGID] = initial_state(self.values, self.table)
         angles = self.state[rb.ANGLES : rb.ANGLES + 3]

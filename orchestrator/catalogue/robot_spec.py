@@ -2,8 +2,6 @@
 
 from __future__ import annotations
 
-import hashlib
-import json
 import re
 from pathlib import Path
 from typing import Annotated, Any, Literal
@@ -127,12 +125,9 @@ class RobotSpec(Strict):
 
     @property
     def fmu_name(self) -> str:
-        """The name of the robot's FMU: outside the catalogue with a hash, since two robots may have one name."""
-        if self._path.parent == FOLDER:
-            return self.name
-        content = json.dumps([self.title, self.n_wheels, self.parameters], sort_keys=True)
-        digest = hashlib.sha256(content.encode()).hexdigest()[:12]
-        return f"robot_{re.sub('[^A-Za-z0-9_]', '_', self.name)}_{digest}"
+        """The name of the robot's FMU: a C identifier, whatever the file is called."""
+        name = re.sub("[^A-Za-z0-9_]", "_", self.name)
+        return name if name[0].isalpha() else f"robot_{name}"
 
     @property
     def n_wheels(self) -> int:

@@ -75,8 +75,10 @@ Quiet = Annotated[bool, typer.Option("--quiet", help="No progress.")]
 
 
 @app.command()
-def build(out: Annotated[Path, typer.Option(help="Folder of the FMUs.")] = Path("fmu")) -> None:
-    """Build the FMUs of cable, contact and every robot of the catalogue."""
+def build(
+    out: Annotated[Path | None, typer.Option(help="Folder of the FMUs. Default: the cache that runs use.")] = None,
+) -> None:
+    """Build the FMUs of cable, contact and every robot of the catalogue; print where they are."""
     from orchestrator.catalogue.library import build_all
 
     for path in build_all(out):

@@ -17,10 +17,10 @@ from orchestrator.scenario.types import LandingScenario
 
 INNER_STEPS = {"waveform": 4, "hermite": 4, "point": 1}
 """Inner steps of our cable in a macro step, where the scenario gives no `integration_step`. The error that they leave
-shrinks with the macro step as that of the exchange does, and stays a tenth of it (docs/decisions.md)."""
+shrinks with the macro step as that of the exchange does, and stays a tenth of it (docs/notebook/decisions.md)."""
 LONGEST_ADAPTIVE = 2.5e-3
 """Longest such step, s, where the master's steps are adaptive: long macro steps are then wanted, and the local error does
-not tell that of the cable's inner steps (docs/masters.md)."""
+not tell that of the cable's inner steps (docs/notebook/adaptive.md)."""
 
 
 def landing_graph(scenario: LandingScenario, exchange: str) -> Graph:

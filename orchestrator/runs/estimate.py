@@ -7,7 +7,7 @@ rule):
     finer, at H/2:   e(H) = d 2^p / (2^p - 1),  between d and 2 d for any p >= 1
     coarser, at 2H:  e(H) = d / (2^p - 1),      between d / 15 and d for p from 4 to 1
 
-What the estimate depends on is whether the error falls with the step, and at H/2 it mostly does (docs/estimate.md).
+What the estimate depends on is whether the error falls with the step, and at H/2 it mostly does (docs/notebook/estimate.md).
 """
 
 from __future__ import annotations

@@ -55,7 +55,7 @@ class In:
 class Simulation(Section):
     """Times in s. `tolerances`: the largest `relative_max_error` that `compare` lets pass, by signal.
 
-    `estimate`: by which second run `run` estimates the error of those signals, if any (docs/estimate.md). `timeout`: wall
+    `estimate`: by which second run `run` estimates the error of those signals, if any (docs/concepts/error.md). `timeout`: wall
     time that an FMU may take for one step or its initialisation; none: as long as it likes.
     """
 
@@ -71,7 +71,7 @@ class Simulation(Section):
 class CableSection(Section):
     """The cable: parameters by their names in the contract; `fmu` is a foreign one instead of ours.
 
-    `steps`, here and below: steps that the FMU makes in each step of the master (docs/masters.md).
+    `steps`, here and below: steps that the FMU makes in each step of the master (docs/reference/masters.md).
     """
 
     fmu: str | None = None

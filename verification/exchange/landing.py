@@ -10,7 +10,7 @@ from scipy.spatial.transform import Rotation
 from orchestrator.coupling.run.results import Table
 from orchestrator.landing import build as landing
 from orchestrator.landing.fields import interface_balance
-from orchestrator.runs.coupled import run
+from orchestrator.runs.coupled import run_coupled
 from orchestrator.runs.record import Coupled
 from orchestrator.scenario.read import load
 from orchestrator.scenario.types import Scenario
@@ -26,7 +26,7 @@ def scenario(name: str, stop: float, *settings: str) -> Scenario:
 
 def coupled(made: Scenario, macro_step: float) -> Coupled:
     """Return a run that came to its end."""
-    result = run(made.changed(macro_step=macro_step))
+    result = run_coupled(made.changed(macro_step=macro_step))
     if result.log.error is not None:
         raise RuntimeError(f"{made.name}, macro step {macro_step:g} s: {result.log.error}")
     return result

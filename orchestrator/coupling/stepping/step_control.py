@@ -33,7 +33,7 @@ class StepControl:
     2^p - 1, p = 4, estimates the local error of the pair. The step of 2h begins at the loads that the pair found, in the
     mean, and need not be solved to the end: about a fifth of the pair's solves. Solved to the end, it tells the local error
     within a factor of three in nine pairs of ten; differences to a prediction, and jumps of the load, do not
-    (docs/masters.md). An error above the tolerance, or an iteration that does not converge: all is rolled back and h
+    (docs/reference/masters.md). An error above the tolerance, or an iteration that does not converge: all is rolled back and h
     shortened. Otherwise a PI controller changes the length that is wanted by (S tol/e)^a (e before/S tol)^b, with e taken
     from h to that length by its fifth power.
 
