@@ -93,7 +93,7 @@ def list_() -> None:
     from orchestrator.catalogue import listing as catalogue
 
     groups = {
-        "Scenarios": catalogue.scenarios(Path("scenarios")),
+        "Scenarios": catalogue.scenarios(),
         "Robots": catalogue.robots(),
         "Masters": catalogue.masters(),
     }

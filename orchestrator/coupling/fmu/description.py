@@ -17,7 +17,8 @@ import fmpy
 import numpy as np
 from fmpy.model_description import ModelDescription, ModelVariable
 
-KINDS: dict[str, str] = {
+Kind = Literal["real", "integer", "boolean", "string", "binary", "clock"]
+KINDS: dict[str, Kind] = {
     "Real": "real",
     "Float64": "real",
     "Float32": "real",
@@ -39,7 +40,7 @@ class Port:
     name: str
     vr: int
     unit: str
-    kind: Literal["real", "integer", "boolean", "string", "binary", "clock"]
+    kind: Kind
     causality: str
     variability: str
     start: str | None
@@ -98,7 +99,7 @@ def element_names(variable: ModelVariable) -> list[str]:
 
 
 def ports_of(variable: ModelVariable) -> list[Port]:
-    kind: Any = KINDS.get(variable.type, "integer")
+    kind = KINDS.get(variable.type, "integer")
     unit = variable.unit or (variable.declaredType.unit if variable.declaredType else None) or ""
     size = int(np.prod(variable.shape)) if variable.shape else 1
     names = element_names(variable)
