@@ -24,7 +24,17 @@ from orchestrator.runs.reference import solve_reference
 
 if TYPE_CHECKING:
     from orchestrator.scenario.types import Scenario
-from orchestrator.cli.printing import complain, markup, print_comparison, print_run, print_table, progress_bars, status
+from orchestrator.cli import new
+from orchestrator.cli.printing import (
+    complain,
+    complain_once,
+    markup,
+    print_comparison,
+    print_run,
+    print_table,
+    progress_bars,
+    status,
+)
 
 
 class Commands(TyperGroup):
@@ -58,11 +68,15 @@ app = typer.Typer(
     "2 wrong input; 3 the run failed; 130 interrupted.",
 )
 
-ScenarioFile = Annotated[Path, typer.Argument(metavar="SCENARIO", help="Scenario file (TOML).")]
+app.add_typer(new.app, name="new")
+
+ScenarioFile = Annotated[str, typer.Argument(metavar="SCENARIO", help="Name of a shipped scenario, or a TOML file.")]
 Out = Annotated[
     Path | None, typer.Option(help="Directory of the results; it must not exist. Default: runs/SCENARIO-NNN.")
 ]
-Robot = Annotated[str | None, typer.Option(metavar="NAME|FILE.fmu", help="Another robot in the scenario's place.")]
+Robot = Annotated[
+    str | None, typer.Option(metavar="NAME|FILE.toml|FILE.fmu", help="Another robot in the scenario's place.")
+]
 MasterName = Annotated[str | None, typer.Option(help="Another master, see `orchestrator list`.")]
 MacroStep = Annotated[float | None, typer.Option(help="Another macro step, s.")]
 Stop = Annotated[float | None, typer.Option(help="Another stop time, s.")]
@@ -244,7 +258,7 @@ def report(
 
 
 def _load(
-    path: Path,
+    path: str,
     robot: str | None,
     overrides: list[str] | None,
     master: str | None = None,
@@ -257,7 +271,10 @@ def _load(
 
     options = {"macro_step": macro_step, "stop_time": stop, "timeout": timeout}
     settings = [f"simulation.{key}={float(value)!r}" for key, value in options.items() if value is not None]
-    return load(path, [*settings, *(overrides or [])], robot, master)
+    scenario = load(path, [*settings, *(overrides or [])], robot, master)
+    for note in scenario.notes:
+        complain_once(note)
+    return scenario
 
 
 def _variants(

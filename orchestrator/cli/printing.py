@@ -5,6 +5,7 @@ from __future__ import annotations
 import sys
 from collections.abc import Callable, Iterator
 from contextlib import contextmanager
+from functools import cache
 from typing import TYPE_CHECKING
 
 from orchestrator.coupling.errors import DONE, FAILED, INTERRUPTED, MISSED
@@ -153,3 +154,9 @@ def progress_bars(quiet: bool) -> Iterator[Callable[[str, float], Callable[[floa
 
 def complain(message: str) -> None:
     print(f"orchestrator: {message}", file=sys.stderr)
+
+
+@cache
+def complain_once(message: str) -> None:
+    """Print it on stderr, but once in a command, which may read a scenario many times."""
+    complain(message)
