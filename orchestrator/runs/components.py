@@ -13,7 +13,8 @@ from fmus.module.variables import ModuleError
 from orchestrator.catalogue import library
 from orchestrator.catalogue import modules as vocabulary
 from orchestrator.coupling.errors import InputError, RunError, nearest
-from orchestrator.coupling.fmu.instance import Fmu, FmuError
+from orchestrator.coupling.fmu.failure import FmuError
+from orchestrator.coupling.fmu.instance import Fmu
 from orchestrator.coupling.fmu.sub_steps import check_steps, instance
 from orchestrator.coupling.graph.graph import Graph
 from orchestrator.coupling.graph.links import Connection
