@@ -35,7 +35,7 @@ def module_fmu(name: str) -> Path:
 
 
 def robot_fmu(robot: RobotSpec) -> Path:
-    """Return the FMU of a robot of the catalogue, up to date."""
+    """Return the FMU of a robot, up to date."""
     return _kept([robot_recipe(robot)])[0]
 
 
@@ -45,10 +45,10 @@ def module_recipe(name: str) -> FmuRecipe:
 
 
 def robot_recipe(robot: RobotSpec) -> FmuRecipe:
-    """Return the recipe of a robot of the catalogue."""
+    """Return the recipe of a robot."""
     from fmus.robot.robot_fmu import robot_recipe
 
-    return robot_recipe(robot.name, robot.n_wheels, robot.parameters, robot.title)
+    return robot_recipe(robot.fmu_name, robot.n_wheels, robot.parameters, robot.title)
 
 
 def build_all(folder: Path | None) -> list[Path]:

@@ -1,13 +1,13 @@
 """Scenario files: TOML, parsed once into types; the only place where dictionaries of settings live.
 
 A scenario is either a landing (``[cable]``, ``[robot]``, ``[contact]``, ``[landing]``) or a general graph of
-FMUs (``[components.NAME]`` and ``connections``). Every value may be bare or a table
-``{ value, source, reason, unit }`` that says where the number comes from.
+FMUs (``[components.NAME]`` and ``connections``). Every value may be bare or a quantity
+``{ value, unit, source, reason }`` that says where the number comes from.
 """
 
 from __future__ import annotations
 
-from collections.abc import Mapping
+from collections.abc import Iterable, Mapping
 from dataclasses import dataclass
 from pathlib import Path
 from typing import Annotated, Any, Literal, Self
@@ -22,8 +22,7 @@ from pydantic import (
 )
 
 from orchestrator.catalogue import modules as vocabulary
-
-Scalar = bool | int | float | str
+from orchestrator.catalogue.quantities import Scalar
 
 DEFAULT_MASTER = "iqn_ils"
 
@@ -46,6 +45,13 @@ Count = Annotated[int, Field(ge=1)]
 NonNegative = Annotated[float, Field(ge=0.0)]
 
 
+@dataclass(frozen=True)
+class In:
+    """The unit of a field: quantities are converted to it, bare numbers stand in it."""
+
+    unit: str
+
+
 class Simulation(Section):
     """Times in s. `tolerances`: the largest `relative_max_error` that `compare` lets pass, by signal.
 
@@ -53,13 +59,13 @@ class Simulation(Section):
     time that an FMU may take for one step or its initialisation; none: as long as it likes.
     """
 
-    stop_time: Positive
-    macro_step: Positive
+    stop_time: Annotated[Positive, In("s")]
+    macro_step: Annotated[Positive, In("s")]
     master: str = DEFAULT_MASTER
     exchange: Literal["point", "hermite", "waveform"] | None = None
     tolerances: dict[str, Positive] = {}
     estimate: Literal["finer", "coarser", "none"] = "finer"
-    timeout: Positive | None = None
+    timeout: Annotated[Positive | None, In("s")] = None
 
 
 class CableSection(Section):
@@ -75,7 +81,7 @@ class CableSection(Section):
 
 
 class RobotSection(Section):
-    """The robot: one of the catalogue (`model`) or any FMU that meets the contract (`fmu`).
+    """The robot: one of the catalogue or a TOML file like those there (`model`), or any FMU of the contract (`fmu`).
 
     `inputs` are held over the whole run: thrust, control torque, drive torques of the wheels.
     """
@@ -89,7 +95,7 @@ class RobotSection(Section):
     @model_validator(mode="after")
     def _one_robot(self) -> RobotSection:
         if (self.model is None) == (self.fmu is None):
-            raise ValueError('give either model = "NAME" (see `orchestrator list`) or fmu = "FILE.fmu"')
+            raise ValueError('give either model = "NAME" (see `orchestrator list`) or "FILE.toml", or fmu = "FILE.fmu"')
         return self
 
 
@@ -110,9 +116,9 @@ class Landing(Section):
     velocity : m/s downwards
     """
 
-    position: float
-    height: NonNegative = 0.0
-    velocity: NonNegative = 0.0
+    position: Annotated[float, In("m")]
+    height: Annotated[NonNegative, In("m")] = 0.0
+    velocity: Annotated[NonNegative, In("m/s")] = 0.0
 
 
 class Component(Section):
@@ -133,11 +139,23 @@ class Component(Section):
 
 @dataclass(frozen=True)
 class Provenance:
-    """Where a value comes from; `source` is ``assumed`` only together with a `reason`."""
+    """Where a value comes from.
+
+    Attributes
+    ----------
+    source : ``scenario`` or ``command line`` if the value names none; ``assumed`` only together with a `reason`
+    unit : in which it was written, None if it was bare
+    written : how it was written, where that was another unit than the variable's: ``18 mm``
+    file : which says it; empty on the command line
+    sha256 : of the file that the value names, where that is a robot's
+    """
 
     source: str = "scenario"
     reason: str = ""
     unit: str | None = None
+    written: str = ""
+    file: str = ""
+    sha256: str = ""
 
 
 class _Common(Section):
@@ -148,6 +166,7 @@ class _Common(Section):
     master: Settings = {}
     _path: Path = PrivateAttr(default=Path("scenario.toml"))
     _provenance: dict[str, Provenance] = PrivateAttr(default_factory=dict)
+    _notes: tuple[str, ...] = PrivateAttr(default=())
 
     @property
     def name(self) -> str:
@@ -164,9 +183,14 @@ class _Common(Section):
         """Source, reason and unit of every value, by its path."""
         return self._provenance
 
-    def placed_at(self, path: Path, provenance: dict[str, Provenance]) -> Self:
-        """Note the file that the scenario comes from, and where each of its values does; return it."""
-        self._path, self._provenance = path, provenance
+    @property
+    def notes(self) -> tuple[str, ...]:
+        """What was decided in reading it that its author may not expect, a line each."""
+        return self._notes
+
+    def read_from(self, path: Path, provenance: Mapping[str, Provenance], notes: Iterable[str] = ()) -> Self:
+        """Note the file that the scenario comes from, where each of its values does, and what is to be said; return it."""
+        self._path, self._provenance, self._notes = path, dict(provenance), tuple(notes)
         return self
 
     def changed(self, options: Settings | None = None, **simulation: Any) -> Self:
@@ -174,7 +198,7 @@ class _Common(Section):
         document = self.model_dump()
         document["simulation"] |= simulation
         document["master"] = document["master"] if options is None else options
-        return type(self).model_validate(document).placed_at(self._path, self._provenance)
+        return type(self).model_validate(document).read_from(self._path, self._provenance, self._notes)
 
 
 class LandingScenario(_Common):
@@ -195,3 +219,13 @@ class GraphScenario(_Common):
 
 Scenario = LandingScenario | GraphScenario
 """One scenario, checked; `isinstance` tells which kind."""
+
+
+UNITS = {
+    f"{section}.{name}": marker.unit
+    for section, model in (("simulation", Simulation), ("landing", Landing))
+    for name, field in model.model_fields.items()
+    for marker in field.metadata
+    if isinstance(marker, In)
+}
+"""Units of the values that belong to no FMU, by their path."""

@@ -11,6 +11,7 @@ import numpy as np
 from orchestrator.coupling.fmu.instance import FmuError, SavedState
 from orchestrator.coupling.graph.graph import Graph, Node
 from orchestrator.coupling.graph.links import GraphError
+from orchestrator.coupling.stepping.bounds import Count, NonNegative, Positive, PositiveCount
 from orchestrator.coupling.stepping.implicit import Implicit
 from orchestrator.coupling.stepping.interpolation import Between, step_node
 from orchestrator.coupling.stepping.jacobian import OwnDerivatives
@@ -58,14 +59,14 @@ class InterfaceJacobian(Implicit):
         self,
         graph: Graph,
         *,
-        reuse: int = 8,
-        threshold: float = 1e-6,
-        relaxation: float = 0.1,
-        difference: float = 1e-2,
-        slow: int = 6,
-        inner_tolerance: float = 0.1,
-        inner_iterations: int = 30,
-        max_iterations: int = 10,
+        reuse: Count = 8,
+        threshold: NonNegative = 1e-6,
+        relaxation: Positive = 0.1,
+        difference: Positive = 1e-2,
+        slow: PositiveCount = 6,
+        inner_tolerance: Positive = 0.1,
+        inner_iterations: PositiveCount = 30,
+        max_iterations: PositiveCount = 10,
         **options: Any,
     ):
         accelerator = LeastSquares(graph.torn.size, reuse, threshold, relaxation)

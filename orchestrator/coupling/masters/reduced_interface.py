@@ -11,6 +11,7 @@ import numpy as np
 from orchestrator.coupling.fmu.instance import Fmu, SavedState
 from orchestrator.coupling.graph.graph import Graph, Node
 from orchestrator.coupling.graph.links import GraphError
+from orchestrator.coupling.stepping.bounds import Positive, PositiveCount
 from orchestrator.coupling.stepping.interpolation import Between, Loads, step_node
 from orchestrator.coupling.stepping.least_squares import LeastSquares
 from orchestrator.coupling.stepping.master import Master
@@ -48,9 +49,9 @@ class ReducedInterface(Master):
         self,
         graph: Graph,
         *,
-        tolerance: float = 1e-6,
-        max_iterations: int = 50,
-        difference: float = 1.0,
+        tolerance: Positive = 1e-6,
+        max_iterations: PositiveCount = 50,
+        difference: Positive = 1.0,
     ):
         super().__init__(graph)
         self.tolerance, self.max_iterations, self.difference = tolerance, max_iterations, difference

@@ -10,6 +10,7 @@ import numpy as np
 from orchestrator.coupling.fmu.instance import SavedState
 from orchestrator.coupling.graph.graph import Graph
 from orchestrator.coupling.stepping.accelerator import Accelerator
+from orchestrator.coupling.stepping.bounds import Positive, PositiveCount
 from orchestrator.coupling.stepping.implicit import Implicit
 from orchestrator.coupling.stepping.report import StepReport
 
@@ -41,9 +42,9 @@ class SemiImplicit(Implicit):
         self,
         graph: Graph,
         *,
-        tolerance: float = 1e-3,
-        refresh: int = 20,
-        difference: float = 1e-3,
+        tolerance: Positive = 1e-3,
+        refresh: PositiveCount = 20,
+        difference: Positive = 1e-3,
         **options: Any,
     ):
         super().__init__(graph, Accelerator(), tolerance=tolerance, **options)

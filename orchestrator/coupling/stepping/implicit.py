@@ -18,6 +18,7 @@ from orchestrator.coupling.fmu.instance import ERROR, FmuError, SavedState
 from orchestrator.coupling.graph.graph import Graph, Node
 from orchestrator.coupling.graph.links import GraphError
 from orchestrator.coupling.stepping.accelerator import Accelerator
+from orchestrator.coupling.stepping.bounds import Count, NonNegative, Positive, PositiveCount
 from orchestrator.coupling.stepping.interpolation import Between, Loads, step_node
 from orchestrator.coupling.stepping.master import Master, require_rollback
 from orchestrator.coupling.stepping.predictor import Predictor
@@ -66,13 +67,13 @@ class Implicit(Master):
         graph: Graph,
         accelerator: Accelerator,
         *,
-        tolerance: float = 1e-6,
-        absolute: float = 1e-3,
+        tolerance: Positive = 1e-6,
+        absolute: Positive = 1e-3,
         lever: float = 0.01,
-        max_iterations: int = 25,
-        max_depth: int = 6,
+        max_iterations: PositiveCount = 25,
+        max_depth: Count = 6,
         predictor: int = -1,
-        local_tolerance: float = 0.0,
+        local_tolerance: NonNegative = 0.0,
         parallel: str = "auto",
     ):
         super().__init__(graph, parallel=parallel)
