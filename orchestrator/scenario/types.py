@@ -110,7 +110,7 @@ class ContactSection(Section):
     parameters: Settings = {}
 
 
-class Landing(Section):
+class LandingSection(Section):
     """Where and how the robot comes down.
 
     Attributes
@@ -211,7 +211,7 @@ class LandingScenario(_Common):
     cable: CableSection
     robot: RobotSection
     contact: ContactSection = ContactSection()
-    landing: Landing
+    landing: LandingSection
 
 
 class GraphScenario(_Common):
@@ -227,7 +227,7 @@ Scenario = LandingScenario | GraphScenario
 
 UNITS = {
     f"{section}.{name}": marker.unit
-    for section, model in (("simulation", Simulation), ("landing", Landing))
+    for section, model in (("simulation", Simulation), ("landing", LandingSection))
     for name, field in model.model_fields.items()
     for marker in field.metadata
     if isinstance(marker, In)
