@@ -9,7 +9,7 @@ STAMP := $(VENV)/.installed
 
 export OPENBLAS_NUM_THREADS ?= 1
 
-.PHONY: env run test lint verify bench clean
+.PHONY: env run test lint docs measure verify bench clean
 
 env: $(STAMP)
 
@@ -38,6 +38,17 @@ lint: env
 	$(BIN)/pyright
 	$(BIN)/lint-imports
 
+$(VENV)/.docs: $(STAMP)
+	@$(BIN)/python -m pip install --quiet --disable-pip-version-check -e '.[docs]'
+	@touch $@
+
+docs: $(VENV)/.docs
+	$(BIN)/python -m sphinx -q -n -W --keep-going -b html docs docs/_build/html
+	@echo "docs/_build/html/index.html"
+
+measure: env
+	$(BIN)/python docs/measured.py
+
 verify: env
 	$(BIN)/python -m verification
 	$(BIN)/python -m pytest -q -m slow || test $$? -eq 5  # 5: no test is marked slow
@@ -46,4 +57,4 @@ bench: env
 	@for file in $(wildcard benchmarks/*.py); do echo "== $$file"; $(BIN)/python "$$file"; done
 
 clean:
-	rm -rf $(VENV) build fmu
+	rm -rf $(VENV) build dist

@@ -1,8 +1,5 @@
 """The cable at rest, held against independent solutions (`verification/cable`), and where there is none."""
 
-import re
-from pathlib import Path
-
 import numpy as np
 import pytest
 from hypothesis import given, settings
@@ -145,11 +142,3 @@ def test_defaults_are_table1():
     made = Cable()
     assert {name: made[name] for name in TABLE1} == TABLE1
     assert PHYSICAL["axial_stiffness"] == 8.12e7 / 4 and RIG["span"] == 10.0
-
-
-def test_readme_names_every_parameter_and_output():
-    text = (Path(__file__).parents[1] / "fmus" / "cable" / "README.md").read_text()
-    for variable in Cable.table.variables:
-        name = re.sub(r"\.[xyz]$", "", variable.name)
-        name = re.sub(r"^port\[\d\]", "port[k]", re.sub(r"^shape\[\d+\]", "shape[i]", name))
-        assert f"`{name}`" in text, variable.name

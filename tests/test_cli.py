@@ -10,7 +10,6 @@ from time import monotonic
 
 import numpy as np
 import pytest
-from scipy.linalg import expm
 
 from fmus.robot.module import robot_table
 from orchestrator.catalogue import modules as vocabulary
@@ -18,13 +17,11 @@ from orchestrator.coupling.masters import MASTERS
 from orchestrator.coupling.masters.options import master_options
 from orchestrator.coupling.run.results import read_fields, read_table
 from orchestrator.landing.contract import check_variables, is_met
-from orchestrator.runs.coupled import run
+from orchestrator.runs.coupled import run_coupled
 from orchestrator.scenario.read import load
 from tests.fmus import build
+from tests.scenarios import LANDING, OSCILLATOR, ROOT, exact_oscillator
 
-ROOT = Path(__file__).resolve().parents[1]
-OSCILLATOR = str(ROOT / "scenarios" / "oscillator.toml")
-LANDING = str(ROOT / "scenarios" / "landing_200m_point9.toml")
 COMMAND = [sys.executable, "-m", "orchestrator"]
 
 
@@ -40,16 +37,6 @@ def manifest(directory: Path) -> dict:
     return json.loads((directory / "manifest.json").read_text())
 
 
-def exact_oscillator(t: np.ndarray, kc: float = 100.0, k_right: float = 10.0, x_right: float = 0.0) -> np.ndarray:
-    """Positions (2, n) of the two masses of scenarios/oscillator.toml: the exponential of the 4 x 4 matrix."""
-    k, d, dc = 10.0, 0.1, 1.0
-    stiffness = np.array([[k + kc, -kc], [-kc, k_right + kc]])
-    damping = np.array([[d + dc, -dc], [-dc, d + dc]])
-    matrix = np.block([[np.zeros((2, 2)), np.eye(2)], [-stiffness, -damping]])
-    start = np.array([1.0, x_right, 0.0, 0.0])
-    return np.array([(expm(matrix * time) @ start)[:2] for time in t]).T
-
-
 @pytest.fixture(scope="module")
 def oscillator_run(tmp_path_factory) -> tuple[subprocess.CompletedProcess[str], Path]:
     out = tmp_path_factory.mktemp("runs") / "oscillator"
@@ -63,7 +50,7 @@ def landing_run(tmp_path_factory) -> tuple[subprocess.CompletedProcess[str], Pat
 
 
 def test_help_imports_nothing_heavy():
-    code = "import sys, orchestrator.cli; print(*sys.modules)"
+    code = "import sys, orchestrator.cli.commands; print(*sys.modules)"
     done = subprocess.run([sys.executable, "-c", code], cwd=ROOT, capture_output=True, text=True, check=True)
     assert not {"numpy", "numba", "matplotlib", "fmpy", "pydantic"} & set(done.stdout.split())
 
@@ -138,7 +125,7 @@ STIFF = {"coupling_stiffness": 1e6, "stiffness": 1e3, "initial_position": 1.0}
 def test_oscillator_with_every_implicit_master(master: str, right: dict[str, float]):
     """At H = 10 ms within 1e-3 of the range; omega H of the coupling is 0.15 and 14."""
     options = [f"components.right.parameters.{name}={value}" for name, value in right.items()]
-    table = run(load(OSCILLATOR, options, master=master)).table
+    table = run_coupled(load(OSCILLATOR, options, master=master)).table
     exact = exact_oscillator(table["time"], *right.values())
     assert np.max(np.abs(table["left.position"] - exact[0])) < 1e-3 * np.ptp(exact[0])
     assert np.max(np.abs(table["right.position"] - exact[1])) < 1e-3 * np.ptp(exact[1])

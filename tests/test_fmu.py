@@ -13,12 +13,13 @@ import pytest
 
 from orchestrator.coupling.exchange import suffixed
 from orchestrator.coupling.fmu.description import unzip_folder
-from orchestrator.coupling.fmu.instance import NOT_FINITE, TIMEOUT, Fmu, FmuError
+from orchestrator.coupling.fmu.failure import NOT_FINITE, TIMEOUT, FmuError
+from orchestrator.coupling.fmu.instance import Fmu
 from orchestrator.coupling.graph.graph import Graph
 from orchestrator.coupling.graph.links import Connection
 from orchestrator.coupling.masters import MASTERS
 from orchestrator.coupling.run.simulate import simulate
-from tests.fmus import build, compiled, compiler, fmu
+from tests.fmus import build, compiled, described, fmu, needs_compiler, started
 
 
 @pytest.fixture
@@ -26,12 +27,6 @@ def odd():
     instance = fmu("odd", "odd", gain=2.0, note="100% %s %n")
     yield instance
     instance.close()
-
-
-def started(instance: Fmu) -> Fmu:
-    instance.enter_initialization(0.0)
-    instance.exit_initialization()
-    return instance
 
 
 def test_ports_carry_what_the_description_says(odd):
@@ -181,9 +176,7 @@ def test_hang_in_a_process_of_its_own():
     status 3."""
     code = (
         "import os\n"
-        "from orchestrator.graph import Graph\n"
-        "from orchestrator.masters import MASTERS\n"
-        "from orchestrator.simulation import simulate\n"
+        "from orchestrator.coupling import MASTERS, Graph, simulate\n"
         "from tests.fmus import fmu\n"
         "graph = Graph({'a': fmu('odd', 'a', fault=3, fault_time=0.1)}, [])\n"
         "log = simulate(graph, MASTERS['jacobi'](graph), 0.0, 1.0, 0.05, timeout=1.0)\n"
@@ -225,9 +218,6 @@ def test_suffix_goes_before_the_axis():
     assert suffixed("force", "_mean") == "force_mean"
 
 
-needs_compiler = pytest.mark.skipif(compiler() is None, reason="no C compiler on this machine")
-
-
 @needs_compiler
 def test_fmi3_arrays_types_and_states():
     """u = (1, 2) mm held for 0.5 s from x = 1: x = 1 + 1.5, y = (x, 2 x); by hand."""
@@ -247,19 +237,6 @@ def test_fmi3_arrays_types_and_states():
     lag.release(state)
     assert lag.log == ["[ok] made for 100% of the tests"]
     lag.close()
-
-
-def described(path: Path, folder: Path, *changes: tuple[str, str]) -> Path:
-    """Copy an FMU with parts of its model description replaced."""
-    copy = folder / f"changed_{path.name}"
-    with zipfile.ZipFile(path) as old, zipfile.ZipFile(copy, "w") as new:
-        for name in old.namelist():
-            content = old.read(name)
-            for before, after in changes if name == "modelDescription.xml" else ():
-                assert before.encode() in content
-                content = content.replace(before.encode(), after.encode())
-            new.writestr(name, content)
-    return copy
 
 
 @needs_compiler

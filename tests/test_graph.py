@@ -10,9 +10,7 @@ from orchestrator.coupling.graph.graph import Graph
 from orchestrator.coupling.graph.links import Connection, GraphError
 from orchestrator.coupling.masters import MASTERS
 from orchestrator.coupling.run.simulate import simulate
-from tests.fmus import MILD, compiled, compiler, fmu, oscillator
-
-needs_compiler = pytest.mark.skipif(compiler() is None, reason="no C compiler on this machine")
+from tests.fmus import MILD, compiled, fmu, needs_compiler, oscillator
 
 REFUSED = [
     ("a.y", "c.u", "no component 'c'"),

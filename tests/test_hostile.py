@@ -11,12 +11,10 @@ import pytest
 
 from orchestrator.cli import commands as cli
 from orchestrator.coupling.run.results import read_table
-from orchestrator.runs.coupled import run
+from orchestrator.runs.coupled import run_coupled
 from orchestrator.scenario.read import load
-from tests.fmus import build, compiled, compiler
-from tests.test_cli import LANDING, OSCILLATOR
-
-needs_compiler = pytest.mark.skipif(compiler() is None, reason="no C compiler on this machine")
+from tests.fmus import build, compiled, needs_compiler
+from tests.scenarios import LANDING, OSCILLATOR
 
 LOOP = """
 title = "p' = q, q' = -p"
@@ -172,7 +170,7 @@ def test_a_robot_by_other_means_in_the_landing():
     differences = []
     for H in (0.005, 0.0025):
         options = ["simulation.stop_time=0.3", f"simulation.macro_step={H}"]
-        ours, theirs = (run(load(LANDING, options, robot)) for robot in ("fptlir", str(build("robot"))))
+        ours, theirs = (run_coupled(load(LANDING, options, robot)) for robot in ("fptlir", str(build("robot"))))
         assert theirs.log.error is None and theirs.log.unconverged == 0
         assert (ours.exchange, theirs.exchange) == ("waveform", "point")
         z, other = (c.table["robot.body.position.z"] for c in (ours, theirs))

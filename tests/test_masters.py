@@ -6,36 +6,17 @@ error is the coupling's.
 
 from __future__ import annotations
 
-from collections.abc import Iterator
-from contextlib import contextmanager
-
 import numpy as np
 import pytest
 
-from orchestrator.coupling.fmu.instance import FmuError
+from orchestrator.coupling.fmu.failure import FmuError
 from orchestrator.coupling.graph.graph import Graph
 from orchestrator.coupling.graph.links import Connection, GraphError
 from orchestrator.coupling.masters import MASTERS
 from orchestrator.coupling.run.log import Log
 from orchestrator.coupling.run.simulate import simulate
 from tests.fmus import MILD, STIFF, chain, chain_solution, fmu, oscillator, oscillator_solution
-
-POSITIONS = ["a.position", "b.position"]
-IMPLICIT = [name for name, master in MASTERS.items() if master.IMPLICIT]
-ITERATED = [name for name in IMPLICIT if name != "semi_implicit"]
-
-
-@contextmanager
-def closing(graph: Graph) -> Iterator[Graph]:
-    try:
-        yield graph
-    finally:
-        graph.close()
-
-
-def run(graph: Graph, master: str, H: float, stop: float, record=None, timeout=None, **options) -> Log:
-    with closing(graph):
-        return simulate(graph, MASTERS[master](graph, **options), 0.0, stop, H, record, timeout=timeout)
+from tests.systems import IMPLICIT, ITERATED, POINT, POSITIONS, closing, faulty_oscillator, run
 
 
 def error(master: str, H: float, system: dict, waveform: bool = False, stop: float = 2.0, **options) -> float:
@@ -48,19 +29,6 @@ def error(master: str, H: float, system: dict, waveform: bool = False, stop: flo
 
 def slopes(errors: list[float]) -> np.ndarray:
     return np.log2(np.array(errors[:-1]) / errors[1:])
-
-
-# the inputs of these FMUs are held (no slope for left.position), which limits every point exchange to order 2
-POINT = [
-    ("jacobi", {}, 1),
-    ("jacobi", {"extrapolation": 1}, 2),
-    ("gauss_seidel", {}, 1),
-    ("gauss_seidel", {"extrapolation": 1}, 2),
-    ("nepce", {}, 2),
-    ("reduced_interface", {}, 2),
-    *((name, {"tolerance": 1e-10}, 2) for name in ITERATED),
-    ("semi_implicit", {}, 2),
-]
 
 
 @pytest.mark.parametrize(("master", "options", "order"), POINT, ids=lambda v: str(v))
@@ -208,15 +176,6 @@ def test_fault_ends_the_run_with_a_message_and_what_there_is(master, fault, stat
     assert log.error.time == pytest.approx(0.05, abs=1e-3)
     assert len(log.time) == len(log.values) == len(log.steps) + 1 == 6
     assert np.all(np.isfinite(log.values))
-
-
-def faulty_oscillator(**fault) -> Graph:
-    """The mild oscillator, and an odd FMU that follows mass a."""
-    graph = oscillator(**MILD)
-    parts = {**graph.components, "c": fmu("odd", "c", **fault)}
-    watcher = [Connection("a.position", "c.u")]
-    feedback = [Connection("c.held_out", "c.held_in")]
-    return Graph(parts, [*graph.connections, *watcher, *feedback])
 
 
 @pytest.mark.parametrize("master", ITERATED)

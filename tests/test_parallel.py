@@ -8,7 +8,8 @@ from time import perf_counter, sleep
 import numpy as np
 import pytest
 
-from orchestrator.coupling.fmu.instance import TIMEOUT, Fmu
+from orchestrator.coupling.fmu.failure import TIMEOUT
+from orchestrator.coupling.fmu.instance import Fmu
 from orchestrator.coupling.graph.graph import Graph
 from orchestrator.coupling.graph.links import Connection
 from orchestrator.coupling.masters import MASTERS
@@ -16,9 +17,9 @@ from orchestrator.coupling.run.log import Log
 from orchestrator.coupling.run.simulate import simulate
 from orchestrator.coupling.stepping.master import Master
 from orchestrator.coupling.stepping.parallel import processors
-from tests.fmus import MILD, compiled, compiler, oscillator
+from tests.fmus import MILD, compiled, needs_compiler, oscillator
 
-pytestmark = pytest.mark.skipif(compiler() is None, reason="no C compiler on this machine")
+pytestmark = needs_compiler
 NAMES = ("p", "q", "r")
 PARALLEL = [name for name in MASTERS if name != "reduced_interface"]
 

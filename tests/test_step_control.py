@@ -5,7 +5,6 @@ Expected values: the analytic solution of the oscillator; the monolithic solutio
 
 from __future__ import annotations
 
-from pathlib import Path
 from types import SimpleNamespace
 
 import numpy as np
@@ -15,11 +14,11 @@ from orchestrator.coupling.stepping.step_control import joined
 from orchestrator.runs.compare import held_against
 from orchestrator.runs.coupled import run_coupled
 from orchestrator.runs.reference import solve_reference
+from orchestrator.runs.summary import result
 from orchestrator.scenario.read import load
-from tests.test_cli import LANDING
-from tests.test_masters import IMPLICIT, MILD, POSITIONS, faulty_oscillator, oscillator, oscillator_solution, run
-
-DROP = Path(LANDING).parent / "drop_5cm.toml"
+from tests.fmus import MILD, oscillator, oscillator_solution
+from tests.scenarios import DROP
+from tests.systems import IMPLICIT, POSITIONS, faulty_oscillator, run
 
 
 def controlled(master: str, tolerance: float):
@@ -80,8 +79,8 @@ def test_hard_impact_takes_fewer_solves_than_fixed_steps():
     The roll of both is what the impact leaves in the first tenth of a second.
     """
     reference = solve_reference(drop(0.02), [0.00125])
-    fixed = held_against(run_coupled(drop(0.00125)), reference)
-    adaptive = held_against(run_coupled(drop(0.02, "master.local_tolerance=1e-6")), reference)
+    fixed = held_against(result(run_coupled(drop(0.00125))), reference)
+    adaptive = held_against(result(run_coupled(drop(0.02, "master.local_tolerance=1e-6"))), reference)
     z, roll = "robot.body.position.z", "robot.roll"
     assert adaptive.unconverged_steps == 0
     assert adaptive.cable_steps < fixed.cable_steps

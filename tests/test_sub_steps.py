@@ -21,12 +21,10 @@ from orchestrator.coupling.run.simulate import simulate
 from orchestrator.runs.components import opened
 from orchestrator.runs.coupled import run_coupled
 from orchestrator.scenario.read import load
-from tests.fmus import MILD, compiled, compiler, fmu, oscillator, oscillator_solution
-from tests.test_fmu import described, started
-from tests.test_masters import IMPLICIT, ITERATED, POINT, POSITIONS, faulty_oscillator, run
+from tests.fmus import MILD, compiled, described, fmu, needs_compiler, oscillator, oscillator_solution, started
+from tests.scenarios import OSCILLATOR
+from tests.systems import IMPLICIT, ITERATED, POINT, POSITIONS, faulty_oscillator, run
 
-needs_compiler = pytest.mark.skipif(compiler() is None, reason="no C compiler on this machine")
-OSCILLATOR = Path(__file__).resolve().parents[1] / "scenarios" / "oscillator.toml"
 VARIES = 'canHandleVariableCommunicationStepSize="true"'
 
 

@@ -11,7 +11,7 @@ from orchestrator.landing import build as landing
 from orchestrator.landing.monolithic.solve import integrate
 from orchestrator.runs.coupled import run_coupled
 from orchestrator.scenario.read import load
-from tests.test_system_energy import SCENARIOS, scenario
+from tests.scenarios import LANDING, scenario
 
 FREE = {"robot.parameters.wheel[1].braked": "false"}
 PUSH = {"robot.parameters.initial.velocity.x": 2.0, "landing.height": 0.02}
@@ -43,7 +43,7 @@ def test_falling_off_is_seen_and_the_books_still_balance():
 
 def test_falling_off_ends_in_a_clear_verdict(tmp_path):
     sets = [part for key, value in PUSH.items() for part in ("--set", f"{key}={value}")]
-    arguments = ["run", str(SCENARIOS / "landing_200m_point9.toml"), "--stop", "0.4", "--quiet", *sets]
+    arguments = ["run", str(LANDING), "--stop", "0.4", "--quiet", *sets]
     result = CliRunner().invoke(cli.app, [*arguments, "--out", str(tmp_path / "fallen")])
     assert result.exit_code == 1
     assert "the robot has fallen off" in result.output + (result.stderr if result.stderr_bytes else "")
@@ -116,10 +116,9 @@ def test_point_tends_to_the_same_motion_as_waveform():
     bring its roll nearer to that of `waveform`, whose own error at 2.5 ms is a hundredth."""
     stop, step = 0.5, 0.0025
     sets = [f"simulation.stop_time={stop}", "simulation.master=iqn_ils"]
-    path = SCENARIOS / "landing_200m_point9.toml"
-    expected = run_coupled(load(path, [*sets, f"simulation.macro_step={step}"])).table["robot.roll"]
+    expected = run_coupled(load(LANDING, [*sets, f"simulation.macro_step={step}"])).table["robot.roll"]
     errors = []
     for parts in (2, 4):
-        one = load(path, [*sets, f"simulation.macro_step={step / parts}", "simulation.exchange=point"])
+        one = load(LANDING, [*sets, f"simulation.macro_step={step / parts}", "simulation.exchange=point"])
         errors.append(np.max(np.abs(run_coupled(one).table["robot.roll"][::parts] - expected)))
     assert errors[1] < 0.5 * errors[0]

@@ -1,7 +1,5 @@
 """Energy and momentum of whole runs, coupled and monolithic: the first law, and action = reaction at the interface."""
 
-from pathlib import Path
-
 import numpy as np
 import pytest
 
@@ -14,17 +12,8 @@ from orchestrator.landing.monolithic import solve
 from orchestrator.landing.monolithic.solve import integrate
 from orchestrator.runs.components import opened
 from orchestrator.runs.coupled import run_coupled
-from orchestrator.runs.files import summary
-from orchestrator.scenario.read import load
-
-SCENARIOS = Path(__file__).parent.parent / "scenarios"
-
-
-def scenario(name="landing_200m_point9", stop=1.0, master=None, macro_step=0.005, **values):
-    """A scenario of the repository, shortened; in `values` ``__`` stands for a dot."""
-    settings = {"simulation.stop_time": float(stop), "simulation.macro_step": macro_step}
-    settings |= {key.replace("__", "."): value for key, value in values.items()}
-    return load(SCENARIOS / f"{name}.toml", [f"{key}={value}" for key, value in settings.items()], None, master)
+from orchestrator.runs.summary import summary
+from tests.scenarios import scenario
 
 
 @pytest.fixture(scope="module")

@@ -12,7 +12,7 @@ from fmus.robot import rigid_body as rb
 from fmus.robot.module import body_parameters, initial_state
 from orchestrator.landing import build as landing
 from orchestrator.landing.monolithic.solve import integrate, solve
-from tests.test_system_energy import scenario
+from tests.scenarios import scenario
 
 
 class Independent:

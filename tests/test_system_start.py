@@ -9,7 +9,7 @@ from orchestrator.coupling.run.simulate import simulate
 from orchestrator.landing import build as landing
 from orchestrator.landing.monolithic.solve import integrate, solve
 from orchestrator.runs.components import opened
-from tests.test_system_energy import scenario
+from tests.scenarios import scenario
 
 STOP, STEP = 0.1, 0.005
 Z, FORCE = "robot.body.position.z", "contact1.normal_force"

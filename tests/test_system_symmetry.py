@@ -10,7 +10,7 @@ from fmus.kernels.rotations import from_rotation_vector, multiply
 from orchestrator.landing import build as landing
 from orchestrator.landing.monolithic.solve import Integrator, integrate
 from orchestrator.runs.coupled import run_coupled
-from tests.test_system_energy import scenario
+from tests.scenarios import scenario
 
 ROUND_OFF = 1e-10
 """m and rad, over 1 s."""

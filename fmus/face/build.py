@@ -1,6 +1,6 @@
 """The build: from a recipe to an FMU, the same bytes from the same input.
 
-    python -m fmus.face.build [--out DIR]        builds cable, contact and robot
+    python -m fmus.face.build [--out DIR]        builds cable, contact and robot, without --out in the user's cache
 
 An FMU holds the binary of pythonfmu, a script of its own name, and a copy of the sources under a name made of
 their hash (see fmu_start.py). Each is put together in a process of its own, which imports that copy and reads
@@ -11,7 +11,6 @@ from __future__ import annotations
 
 import argparse
 import ast
-import contextlib
 import datetime
 import hashlib
 import importlib
@@ -24,7 +23,7 @@ import sys
 import tempfile
 import uuid
 import zipfile
-from collections.abc import Iterable, Iterator, Mapping
+from collections.abc import Callable, Iterable, Mapping
 from concurrent.futures import ThreadPoolExecutor
 from dataclasses import dataclass
 from pathlib import Path
@@ -36,8 +35,10 @@ from pythonfmu._version import __version__ as PYTHONFMU_VERSION
 
 from fmus.face import fmu_start
 from fmus.face.fmu_start import digest, package_folder
+from fmus.face.lock import locked
 from fmus.face.model_description import documentation, model_description
 from fmus.kernels import cache
+from fmus.kernels.cache import user_folder
 from fmus.module.recipe import FmuRecipe, make_module
 from fmus.module.variables import ModuleError, VariableTable
 
@@ -49,34 +50,64 @@ EPOCH = int(os.environ.get("SOURCE_DATE_EPOCH", 315532800))
 
 def build_fmu(recipe: FmuRecipe, folder: Path) -> Path:
     """Build ``NAME.fmu`` in `folder`, in a process of its own; return its path."""
-    with _locked(target(recipe, folder)) as path:
+    path = _named(folder, recipe.name)
+    with locked(path):
         return _build(recipe, path)
 
 
 def ensure_fmu(recipe: FmuRecipe, folder: Path) -> Path:
     """Build ``NAME.fmu`` in `folder` if it is missing or older than its sources; return its path."""
-    with _locked(target(recipe, folder)) as path:
-        return _build(recipe, path) if is_stale(path, recipe) else path
+    return _up_to_date(recipe, _named(folder, recipe.name), record(recipe))
 
 
-def ensure_fmus(recipes: Iterable[FmuRecipe], folder: Path) -> list[Path]:
-    """Do so for many, as many at a time as there are processors; return their paths in the same order."""
+def kept_fmu(recipe: FmuRecipe, folder: Path) -> Path:
+    """Build ``NAME-HASH.fmu`` in `folder` if it is missing; return its path.
+
+    The hash is that of all that decides over the content: two robots of one name and two versions of this program
+    have a file each.
+    """
+    facts = record(recipe)
+    return _up_to_date(recipe, _named(folder, f"{recipe.name}-{_hash(facts)}"), facts)
+
+
+def ensure_fmus(
+    recipes: Iterable[FmuRecipe], folder: Path, ensure: Callable[[FmuRecipe, Path], Path] = ensure_fmu
+) -> list[Path]:
+    """Do so, or `kept_fmu`, for many, as many at a time as there are processors; return their paths in the same order."""
     with ThreadPoolExecutor(os.cpu_count()) as pool:
-        return list(pool.map(lambda recipe: ensure_fmu(recipe, folder), recipes))
+        return list(pool.map(lambda recipe: ensure(recipe, folder), recipes))
 
 
-def target(recipe: FmuRecipe, folder: Path) -> Path:
-    """Return the path of the FMU of `recipe` in `folder`."""
-    return Path(folder).resolve() / f"{recipe.name}.fmu"
+def _up_to_date(recipe: FmuRecipe, path: Path, facts: Mapping[str, Any]) -> Path:
+    """Return `path`, built anew if need be; what is up to date is not locked: its folder may be read-only."""
+    if _holds(path, facts):
+        return path
+    path.parent.mkdir(parents=True, exist_ok=True)
+    with locked(path):
+        return path if _holds(path, facts) else _build(recipe, path)
+
+
+def _named(folder: Path, name: str) -> Path:
+    """Return the path of the FMU called `name` in `folder`."""
+    return Path(folder).resolve() / f"{name}.fmu"
+
+
+def _hash(facts: Mapping[str, Any]) -> str:
+    return hashlib.sha256(json.dumps(facts, sort_keys=True).encode()).hexdigest()[:16]
 
 
 def is_stale(path: Path, recipe: FmuRecipe) -> bool:
     """Say whether the FMU at `path` is missing, damaged or made from other sources or another recipe."""
+    return not _holds(path, record(recipe))
+
+
+def _holds(path: Path, facts: Mapping[str, Any]) -> bool:
+    """Say whether there is an FMU at `path` that was made from `facts`."""
     try:
         with zipfile.ZipFile(path) as archive:
-            return json.loads(archive.read(RECORD)) != record(recipe)
+            return json.loads(archive.read(RECORD)) == facts
     except (OSError, KeyError, ValueError, zipfile.BadZipFile):
-        return True
+        return False
 
 
 def record(recipe: FmuRecipe) -> dict[str, Any]:
@@ -102,21 +133,6 @@ def _readme(recipe: FmuRecipe) -> str:
     name, *parts = recipe.factory.split(":")[0].split(".")
     path = _source_folder(name).joinpath(*parts[:-1], "README.md")
     return path.read_text(encoding="utf-8") if path.is_file() else ""
-
-
-@contextlib.contextmanager
-def _locked(path: Path) -> Iterator[Path]:
-    """Let one process at a time work on `path`; its folder is made."""
-    path.parent.mkdir(parents=True, exist_ok=True)
-    name = f"line-landing-{hashlib.sha256(str(path).encode()).hexdigest()[:16]}.lock"
-    with open(Path(tempfile.gettempdir()) / name, "w") as lock:
-        try:
-            import fcntl
-
-            fcntl.flock(lock, fcntl.LOCK_EX)
-        except ImportError:  # not a POSIX system: the replacement of the file is atomic all the same
-            pass
-        yield path
 
 
 def _build(recipe: FmuRecipe, path: Path) -> Path:
@@ -304,14 +320,15 @@ def recipes() -> list[FmuRecipe]:
 def main() -> None:
     """Build every FMU, or (in the process of one FMU) assemble the recipe on the standard input."""
     parser = argparse.ArgumentParser(prog="python -m fmus.face.build", description="Build the FMUs.")
-    parser.add_argument("--out", type=Path, default=Path("fmu"), help="folder of the FMUs")
+    parser.add_argument("--out", type=Path, help="folder of the FMUs; default: a cache of the user's")
     parser.add_argument("--assemble", type=Path, help=argparse.SUPPRESS)
     options = parser.parse_args()
     try:
         if options.assemble:
             write_atomically(options.assemble, assemble(FmuRecipe(**json.load(sys.stdin))))
         else:
-            print(*ensure_fmus(recipes(), options.out), sep="\n")
+            place = (options.out, ensure_fmu) if options.out else (user_folder("fmus"), kept_fmu)
+            print(*ensure_fmus(recipes(), *place), sep="\n")
     except ModuleError as error:
         sys.exit(str(error))
 

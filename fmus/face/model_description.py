@@ -3,7 +3,6 @@
 from __future__ import annotations
 
 import html
-import re
 from collections.abc import Iterable
 from xml.etree.ElementTree import Element, SubElement, indent, tostring
 
@@ -11,21 +10,8 @@ import numpy as np
 from pythonfmu._version import __version__ as PYTHONFMU_VERSION
 
 from fmus.module.recipe import FmuRecipe
+from fmus.module.units import unit
 from fmus.module.variables import Variable, VariableTable
-
-SYMBOLS: dict[str, dict[str, int]] = {
-    "1": {},
-    "m": {"m": 1},
-    "kg": {"kg": 1},
-    "s": {"s": 1},
-    "rad": {"rad": 1},
-    "Hz": {"s": -1},
-    "N": {"kg": 1, "m": 1, "s": -2},
-    "Pa": {"kg": 1, "m": -1, "s": -2},
-    "J": {"kg": 1, "m": 2, "s": -2},
-    "W": {"kg": 1, "m": 2, "s": -3},
-}
-"""Exponents of the base units in each unit symbol."""
 
 CAPABILITIES = {
     "needsExecutionTool": "true",
@@ -46,20 +32,6 @@ LOG_CATEGORIES = {
 }
 
 XML_TYPES = {"real": "Real", "integer": "Integer", "boolean": "Boolean", "string": "String"}
-
-
-def base_unit(unit: str) -> dict[str, int] | None:
-    """Return the exponents of the base units in `unit`, e.g. ``kg.m2/s``; None if not fixed (``N/m^n``)."""
-    exponents: dict[str, int] = {}
-    for place, part in enumerate(unit.split("/")):
-        for factor in part.strip("()").split("."):
-            match = re.fullmatch(r"([A-Za-z]+|1)\^?(\d*)", factor)
-            if match is None or match[1] not in SYMBOLS:
-                return None
-            power = int(match[2] or 1) * (-1 if place else 1)
-            for base, exponent in SYMBOLS[match[1]].items():
-                exponents[base] = exponents.get(base, 0) + power * exponent
-    return {base: exponent for base, exponent in exponents.items() if exponent}
 
 
 def variability(variable: Variable) -> str:
@@ -103,11 +75,12 @@ def model_description(recipe: FmuRecipe, table: VariableTable, values: np.ndarra
 
 def _add_units(root: Element, units: Iterable[str]) -> None:
     definitions = SubElement(root, "UnitDefinitions")
-    for unit in units:
-        node = SubElement(definitions, "Unit", name=unit)
-        exponents = base_unit(unit)
-        if exponents is not None:
-            SubElement(node, "BaseUnit", {base: str(exponent) for base, exponent in exponents.items()})
+    for name in units:
+        node = SubElement(definitions, "Unit", name=name)
+        known = unit(name)
+        if known is not None:
+            factor = {"factor": repr(float(known.factor))} if known.factor != 1 else {}
+            SubElement(node, "BaseUnit", {base: str(n) for base, n in known.exponents.items()} | factor)
 
 
 def _add_variables(root: Element, table: VariableTable, values: np.ndarray) -> None:

@@ -1,4 +1,4 @@
-"""Where modules keep what can be made again: compiled kernels, the sources that an FMU brings along.
+"""Where modules keep what can be made again: compiled kernels, FMUs, the sources that an FMU brings along.
 
 A folder of the user's, ``LINE_LANDING_CACHE`` or ``$XDG_CACHE_HOME/line-landing`` or ``~/.cache/line-landing``; where none
 of them can be written, one in the temporary folder, which is said once. The text of this file is part of the script
@@ -17,29 +17,24 @@ from pathlib import Path
 
 KEPT_DAYS = 30
 """Days without use after which an entry is removed."""
-_said: set[Path] = set()
 
 
 def user_folder(kind: str) -> Path:
     """Return the folder for entries of one `kind`, made if need be; raise `OSError` if it can be made nowhere."""
-    wanted = _wanted()
-    for base in (wanted, _temporary()):
-        folder = base / kind
-        with contextlib.suppress(OSError):
-            folder.mkdir(parents=True, exist_ok=True)
-            if os.access(folder, os.W_OK):
-                _say_if_elsewhere(base, wanted)
-                return folder
-    raise OSError(f"neither {wanted} nor {tempfile.gettempdir()} can be written; set LINE_LANDING_CACHE to a folder")
+    for place in (_wanted, _temporary):
+        with contextlib.suppress(OSError, RuntimeError):  # the latter: a user without a home
+            base = place().expanduser().absolute()
+            (base / kind).mkdir(parents=True, exist_ok=True)
+            if os.access(base / kind, os.W_OK):
+                if place is _temporary:
+                    _settle(base)
+                return base / kind
+    raise OSError(f"neither {_wanted()} nor {tempfile.gettempdir()} can be written; set LINE_LANDING_CACHE to a folder")
 
 
 def _wanted() -> Path:
     given, xdg = os.environ.get("LINE_LANDING_CACHE"), os.environ.get("XDG_CACHE_HOME")
-    if given:
-        return Path(given).absolute()
-    if xdg:
-        return Path(xdg).absolute() / "line-landing"
-    return Path(os.path.expanduser("~")).absolute() / ".cache" / "line-landing"
+    return Path(given) if given else Path(xdg or "~/.cache", "line-landing")
 
 
 def _temporary() -> Path:
@@ -53,10 +48,10 @@ def _temporary() -> Path:
     return Path(tempfile.mkdtemp(prefix="line-landing-"))
 
 
-def _say_if_elsewhere(base: Path, wanted: Path) -> None:
-    if base != wanted and wanted not in _said:
-        _said.add(wanted)
-        print(f"line-landing: {wanted} cannot be written; caches are kept in {base}", file=sys.stderr)
+def _settle(base: Path) -> None:
+    """Stay with `base`, in the processes that this one starts too, which then need not say so again."""
+    print(f"line-landing: {_wanted()} cannot be written; caches are kept in {base}", file=sys.stderr)
+    os.environ["LINE_LANDING_CACHE"] = str(base)
 
 
 def used(entry: Path) -> Path:
@@ -71,5 +66,14 @@ def prune(folder: Path, days: float = KEPT_DAYS) -> None:
     oldest = time.time() - 86400.0 * days
     with contextlib.suppress(OSError):
         for entry in folder.iterdir():
-            if entry.is_dir() and not entry.is_symlink() and entry.stat().st_mtime < oldest:
-                shutil.rmtree(entry, ignore_errors=True)
+            if entry.lstat().st_mtime < oldest:
+                remove(entry)
+
+
+def remove(entry: Path) -> None:
+    """Remove a file, a folder or a link, if that can be done."""
+    if entry.is_dir() and not entry.is_symlink():
+        shutil.rmtree(entry, ignore_errors=True)
+    else:
+        with contextlib.suppress(OSError):
+            entry.unlink()

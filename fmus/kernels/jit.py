@@ -22,13 +22,18 @@ from typing import Any
 
 import numba
 
-from fmus.kernels.cache import prune, used, user_folder
+from fmus.kernels import compilation
+from fmus.kernels.cache import prune, remove, used, user_folder
 
+if __name__ == "fmus.kernels.jit":  # not the copy within an FMU
+    compilation.watch()
 LIBRARIES = {*sys.stdlib_module_names, "numba", "numpy", "scipy", "llvmlite"}
 """What is not looked into: their versions, not their sources, decide over the compiled code."""
 IMPORT = re.compile(
     r"^[ \t]*(?:from[ \t]+([\w.]+)[ \t]+import[ \t]+(\([^)]*\)|[^\n#]*)|import[ \t]+([^\n#]+))", re.MULTILINE
 )
+
+_folders: dict[str, Path] = {}
 
 
 def kernel(function: Callable) -> Callable:
@@ -78,7 +83,22 @@ def code_folder(module: str) -> Path:
     folder = parent / f"{module}-{digest.hexdigest()[:16]}"
     if not folder.is_dir():  # Numba makes it when there is something to keep
         prune(parent)
-    return used(folder)
+        _remove_former(parent)
+    _folders[module] = used(folder)
+    return folder
+
+
+def is_compiled(package: str) -> bool:
+    """Say whether there is compiled code for every file with kernels of `package` that has been imported."""
+    folders = [folder for module, folder in _folders.items() if module.startswith(f"{package}.")]
+    return all(any(folder.glob("*/*.nbi")) for folder in folders)
+
+
+def _remove_former(parent: Path) -> None:
+    """Remove what former versions have compiled beside their sources and beside `parent`."""
+    for place in (Path(__file__).parents[1] / "__pycache__", parent.parent):
+        for folder in place.glob("numba-*"):
+            remove(folder)
 
 
 def sources(module: str) -> dict[str, bytes]:

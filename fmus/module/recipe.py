@@ -14,7 +14,7 @@ from fmus.module.variables import ModuleError, Value, VariableTable
 
 
 class Module(Protocol):
-    """What every face of a module relies on (see docs/architecture.md)."""
+    """What every face of a module relies on (see docs/reference/kernels.md)."""
 
     NAME: str
     TITLE: str

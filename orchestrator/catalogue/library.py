@@ -1,18 +1,20 @@
-"""Our own FMUs: built when they are missing or older than their sources, and only then."""
+"""Our own FMUs: built when they are missing or older than their sources, and only then.
+
+Runs keep them in a cache of the user's, or in the folder that ``LINE_LANDING_FMUS`` names.
+"""
 
 from __future__ import annotations
 
 import os
-from collections.abc import Iterator
+from collections.abc import Callable, Iterable
 from importlib import import_module
 from pathlib import Path
 
+from fmus.kernels.cache import prune, used, user_folder
 from fmus.module.recipe import FmuRecipe
 from orchestrator.catalogue.robot_spec import RobotSpec, catalogue
 from orchestrator.coupling.errors import InputError
 
-FOLDER = Path(os.environ.get("LINE_LANDING_FMUS", "fmu"))
-"""Where runs look for our FMUs and build them."""
 MODULES = ("cable", "contact", "oscillator")
 """Our modules with one FMU each; robots have one for each entry of the catalogue."""
 
@@ -29,12 +31,12 @@ def contact_fmu() -> Path:
 
 def module_fmu(name: str) -> Path:
     """Return the FMU of one of `MODULES`, up to date."""
-    return _ensured(module_recipe(name), FOLDER)
+    return _kept([module_recipe(name)])[0]
 
 
 def robot_fmu(robot: RobotSpec) -> Path:
-    """Return the FMU of a robot of the catalogue, up to date."""
-    return _ensured(robot_recipe(robot), FOLDER)
+    """Return the FMU of a robot, up to date."""
+    return _kept([robot_recipe(robot)])[0]
 
 
 def module_recipe(name: str) -> FmuRecipe:
@@ -43,24 +45,44 @@ def module_recipe(name: str) -> FmuRecipe:
 
 
 def robot_recipe(robot: RobotSpec) -> FmuRecipe:
-    """Return the recipe of a robot of the catalogue."""
+    """Return the recipe of a robot."""
     from fmus.robot.robot_fmu import robot_recipe
 
-    return robot_recipe(robot.name, robot.n_wheels, robot.parameters, robot.title)
+    return robot_recipe(robot.fmu_name, robot.n_wheels, robot.parameters, robot.title)
 
 
-def build_all(folder: Path) -> Iterator[Path]:
-    """Build the FMUs of all modules and of every robot of the catalogue; yield each when it is there."""
-    for recipe in (*map(module_recipe, MODULES), *map(robot_recipe, catalogue().values())):
-        yield _ensured(recipe, folder)
+def build_all(folder: Path | None) -> list[Path]:
+    """Build the FMUs of all modules and of every robot of the catalogue in `folder`, or where runs keep them."""
+    from fmus.face.build import ensure_fmus
+
+    recipes = (*map(module_recipe, MODULES), *map(robot_recipe, catalogue().values()))
+    return _kept(recipes) if folder is None else _within(folder, lambda: ensure_fmus(recipes, folder))
 
 
-def _ensured(recipe: FmuRecipe, folder: Path) -> Path:
-    from fmus.face.build import ensure_fmu
+def _kept(recipes: Iterable[FmuRecipe]) -> list[Path]:
+    """Return the FMUs of `recipes` where runs keep them, up to date."""
+    from fmus.face.build import ensure_fmus, kept_fmu
 
+    folder = _folder()
+    return [used(path) for path in _within(folder, lambda: ensure_fmus(recipes, folder, kept_fmu))]
+
+
+def _folder() -> Path:
+    """Return where runs keep FMUs; from the cache old ones are removed."""
+    given = os.environ.get("LINE_LANDING_FMUS")
+    if given:
+        return Path(given)
     try:
-        folder.mkdir(parents=True, exist_ok=True)
-        return ensure_fmu(recipe, folder)
+        folder = user_folder("fmus")
+    except OSError as error:
+        raise InputError(str(error)) from None
+    prune(folder)
+    return folder
+
+
+def _within(folder: Path, build: Callable[[], list[Path]]) -> list[Path]:
+    try:
+        return build()
     except OSError as error:
         cure = "choose a folder to write to with LINE_LANDING_FMUS (`build`: --out)"
-        raise InputError(f"{folder}: the FMU {recipe.name} cannot be built there ({error.strerror}); {cure}") from None
+        raise InputError(f"{folder}: FMUs cannot be built there ({error.strerror}); {cure}") from None

@@ -2,20 +2,22 @@
 
 from __future__ import annotations
 
-import tomllib
-from pathlib import Path
+from collections.abc import Callable
 
-from orchestrator.catalogue.robot_spec import catalogue
+from orchestrator.catalogue import robot_spec
+from orchestrator.catalogue import scenarios as shipped
+from orchestrator.catalogue.documents import chain
+from orchestrator.coupling.errors import InputError
 
 
-def scenarios(folder: Path) -> dict[str, str]:
-    """Return the titles of the scenario files of `folder` by path."""
-    return {str(path): _title(path) for path in sorted(folder.glob("*.toml"))}
+def scenarios() -> dict[str, str]:
+    """Return the titles of the shipped scenarios by name; what is wrong with a faulty one in its title's place."""
+    return {name: _or_fault(lambda name=name: _title(name)) for name in shipped.names()}
 
 
 def robots() -> dict[str, str]:
-    """Return the titles of the robots of the catalogue by name."""
-    return {name: robot.title for name, robot in catalogue().items()}
+    """Return the titles of the robots of the catalogue by name; what is wrong with a faulty one in its title's place."""
+    return {name: _or_fault(lambda name=name: robot_spec.load_robot(name).title) for name in robot_spec.names()}
 
 
 def masters() -> dict[str, str]:
@@ -25,8 +27,14 @@ def masters() -> dict[str, str]:
     return {name: master.TITLE for name, master in MASTERS.items()}
 
 
-def _title(path: Path) -> str:
+def _title(scenario: str) -> str:
+    """Return the title that a scenario gives, or the nearest file that it extends."""
+    titles = [document.get("title") for _, document in chain(shipped.find(scenario), shipped.find)]
+    return next((str(title) for title in reversed(titles) if title), "")
+
+
+def _or_fault(title: Callable[[], str]) -> str:
     try:
-        return str(tomllib.loads(path.read_text(encoding="utf-8")).get("title", ""))
-    except (OSError, ValueError) as error:
-        return f"cannot be read: {error}"
+        return title()
+    except InputError as error:
+        return f"faulty: {error.problems[0]}"

@@ -7,18 +7,8 @@ from importlib import import_module
 from pathlib import Path
 from typing import Any
 
-from fmus.module.variables import Kind, Value, Variable
+from fmus.module.variables import Bounds, Kind, Value, Variable
 from orchestrator.coupling.errors import InputError
-
-KINDS: dict[str, Kind] = {"Real": "real", "Float64": "real", "Float32": "real", "Boolean": "boolean"}
-KINDS |= {
-    "String": "string",
-    "Integer": "integer",
-    "Enumeration": "integer",
-    "Int32": "integer",
-    "Int64": "integer",
-}
-
 
 MODELS = {
     "cable": ("fmus.cable.module", "Cable"),
@@ -34,12 +24,12 @@ def of_module(kind: str, robot: str | None = None) -> dict[str, Variable]:
     Parameters
     ----------
     kind : one of `MODELS`, or ``robot``
-    robot : name of the catalogue; the number of its wheels decides which variables there are
+    robot : name of the catalogue, or path of a TOML file; the number of its wheels decides which variables there are
     """
     if kind == "robot":
         from orchestrator.catalogue.robot_spec import load_robot
 
-        return robot_variables(load_robot(robot).n_wheels if robot in robots() else 1)
+        return robot_variables(load_robot(robot).n_wheels if robot is not None else 1)
     file, name = MODELS[kind]
     return {v.name: v for v in getattr(import_module(file), name).table.variables}
 
@@ -53,12 +43,14 @@ def robot_variables(n_wheels: int) -> dict[str, Variable]:
 
 def of_fmu(path: Path) -> dict[str, Variable]:
     """Return the variables of the FMU at `path` by name; raise `InputError` if it is none."""
-    from orchestrator.coupling.fmu.description import element_names
+    from orchestrator.coupling.fmu.description import KINDS, element_names
 
     known: dict[str, Variable] = {}
     for v in description(path).modelVariables:
         parameter = v.causality == "parameter" or (v.causality == "local" and v.variability == "tunable")
         kind = KINDS.get(v.type, "integer")
+        if kind in ("binary", "clock"):  # nothing that a scenario or a contract speaks of
+            continue
         fixed = (
             "parameter" if parameter else "input" if v.causality == "input" else "output",
             v.unit or (v.declaredType.unit if v.declaredType else None) or "1",
@@ -66,8 +58,22 @@ def of_fmu(path: Path) -> dict[str, Variable]:
             v.description or "",
             kind,
         )
-        known |= {name: Variable(name, *fixed) for name in element_names(v)}
+        bounds = _bounds(v)
+        known |= {name: Variable(name, *fixed, bounds=bounds) for name in element_names(v)}
     return known
+
+
+def _bounds(variable: Any) -> Bounds:
+    """Return min and max of a variable of a model description, or those of its declared type."""
+    least, most = (getattr(variable, n) or getattr(variable.declaredType, n, None) for n in ("min", "max"))
+    return Bounds(ge=_number(least), le=_number(most))
+
+
+def _number(text: str | None) -> float | None:
+    try:
+        return None if text is None else float(text)
+    except ValueError:
+        return None
 
 
 def _start(text: str | None, kind: Kind) -> Value:
@@ -88,16 +94,16 @@ def description(path: Path) -> Any:
         raise InputError(f"{path}: no such file")
     if not zipfile.is_zipfile(path):
         raise InputError(f"{path}: not an FMU: not a zip archive")
-    from fmpy import read_model_description
+    from orchestrator.coupling.fmu.description import parsed
 
     try:
-        return read_model_description(str(path), validate=False)
+        return parsed(path)
     except Exception as error:  # FMPy and lxml raise many kinds; each means the same to the user
         raise InputError(f"{path}: not an FMU: its modelDescription.xml cannot be read: {error}") from None
 
 
 def robots() -> list[str]:
     """Return the names of the robots of the catalogue."""
-    from orchestrator.catalogue.robot_spec import FOLDER
+    from orchestrator.catalogue.robot_spec import names
 
-    return sorted(path.stem for path in FOLDER.glob("*.toml"))
+    return names()

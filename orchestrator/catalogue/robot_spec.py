@@ -1,117 +1,44 @@
-"""The catalogue of robots: one TOML file a robot, every number with its unit and source."""
+"""Robots: one TOML file each, every number with its unit and source; the catalogue, or anybody's own."""
 
 from __future__ import annotations
 
-import difflib
-import tomllib
+import re
 from pathlib import Path
 from typing import Annotated, Any, Literal
 
 import numpy as np
-from pydantic import AfterValidator, BaseModel, ConfigDict, Field, ValidationError, model_validator
+from pydantic import BaseModel, ConfigDict, Field, PrivateAttr, ValidationError
+
+from fmus.module.units import convert
+from orchestrator.catalogue.documents import Document, Stack, chain
+from orchestrator.catalogue.quantities import (
+    ASSUMED,
+    POSITIVE,
+    SOURCED,
+    Choice,
+    Number,
+    Quantity,
+    Triple,
+    complaints,
+    in_unit,
+)
+from orchestrator.coupling.errors import InputError, nearest
 
 FOLDER = Path(__file__).parent / "robots"
-ASSUMED = "assumed"
 
-UNITS: dict[str, tuple[str, float]] = {
-    "1": ("1", 1.0),
-    "m": ("m", 1.0),
-    "mm": ("m", 1e-3),
-    "kg": ("kg", 1.0),
-    "kg.m2": ("kg.m2", 1.0),
-    "rad": ("rad", 1.0),
-    "deg": ("rad", np.pi / 180.0),
-}
-"""Unit in a file → SI unit and factor."""
-
-Number = Annotated[float, Field(strict=True, allow_inf_nan=False)]
-
-
-class RobotError(ValueError):
-    """A robot cannot be loaded: the message names file, key, cause and cure."""
+Mass = Annotated[Number, POSITIVE, in_unit("kg")]
+Moment = Annotated[Number, POSITIVE, in_unit("kg.m2")]
+Product = Annotated[Number, in_unit("kg.m2")]
+Length = Annotated[Number, POSITIVE, in_unit("m")]
+Angle = Annotated[Number, POSITIVE, in_unit("rad")]
+Position = Annotated[Triple, in_unit("m")]
+Direction = Annotated[Triple, in_unit("1")]
 
 
 class Strict(BaseModel):
-    """A part of the file: unknown keys are errors, values do not change."""
+    """A part of the file: unknown keys are errors, values do not change. Numbers are SI once they are read."""
 
     model_config = ConfigDict(extra="forbid", frozen=True)
-
-
-class Stated(Strict):
-    """What everything stated carries: its source, and the reason if it is assumed."""
-
-    source: Annotated[str, Field(min_length=1)]
-    reason: str | None = None
-
-    @model_validator(mode="after")
-    def _reason_if_assumed(self) -> Stated:
-        if self.source == ASSUMED and not self.reason:
-            raise ValueError('what is assumed needs its reason; add reason = "..."')
-        return self
-
-
-class Choice(Stated):
-    """A yes or no."""
-
-    value: Annotated[bool, Field(strict=True)]
-
-
-class Quantity(Stated):
-    """What has a unit."""
-
-    unit: str
-
-    @property
-    def factor(self) -> float:
-        """Return the factor from the file's unit to SI."""
-        return UNITS[self.unit][1]
-
-
-class Scalar(Quantity):
-    """A number with unit and source."""
-
-    value: Number
-
-    @property
-    def si(self) -> float:
-        """Return the number in SI units."""
-        return self.value * self.factor
-
-
-class Vector(Quantity):
-    """Three numbers with unit and source."""
-
-    value: tuple[Number, Number, Number]
-
-    @property
-    def si(self) -> np.ndarray:
-        """Return the numbers in SI units: (3,) float64."""
-        return np.array(self.value) * self.factor
-
-
-def _in_unit(si_unit: str) -> AfterValidator:
-    def check(number: Quantity) -> Quantity:
-        if UNITS.get(number.unit, ("", 0.0))[0] != si_unit:
-            possible = ", ".join(name for name, (si, _) in UNITS.items() if si == si_unit)
-            raise ValueError(f"unit {number.unit!r} does not fit; possible here: {possible}")
-        return number
-
-    return AfterValidator(check)
-
-
-def _positive(number: Scalar) -> Scalar:
-    if number.value <= 0.0:
-        raise ValueError(f"{number.value:g} {number.unit} is not positive; give a value above 0")
-    return number
-
-
-Mass = Annotated[Scalar, _in_unit("kg"), AfterValidator(_positive)]
-Moment = Annotated[Scalar, _in_unit("kg.m2"), AfterValidator(_positive)]
-Product = Annotated[Scalar, _in_unit("kg.m2")]
-Length = Annotated[Scalar, _in_unit("m"), AfterValidator(_positive)]
-Angle = Annotated[Scalar, _in_unit("rad"), AfterValidator(_positive)]
-Position = Annotated[Vector, _in_unit("m")]
-Direction = Annotated[Vector, _in_unit("1")]
 
 
 class Inertia(Strict):
@@ -128,8 +55,8 @@ class Inertia(Strict):
     @property
     def tensor(self) -> np.ndarray:
         """Return the tensor as the file has it: (3, 3) float64, kg m²."""
-        xy, xz, yz = (0.0 if product is None else product.si for product in (self.xy, self.xz, self.yz))
-        return np.array([[self.xx.si, xy, xz], [xy, self.yy.si, yz], [xz, yz, self.zz.si]])
+        xy, xz, yz = (0.0 if product is None else product.value for product in (self.xy, self.xz, self.yz))
+        return np.array([[self.xx.value, xy, xz], [xy, self.yy.value, yz], [xz, yz, self.zz.value]])
 
 
 class Body(Strict):
@@ -143,26 +70,26 @@ class Body(Strict):
         """Return the tensor about G: (3, 3) float64, kg m²; from b by the parallel axis theorem."""
         if self.inertia.about == "G":
             return self.inertia.tensor
-        r = self.center_of_mass.si
-        return self.inertia.tensor - self.mass.si * (r @ r * np.eye(3) - np.outer(r, r))
+        r = np.array(self.center_of_mass.value)
+        return self.inertia.tensor - self.mass.value * (r @ r * np.eye(3) - np.outer(r, r))
 
 
 class Wheel(Strict):
     """One wheel: where its centre is (from b, in B), its axle, and whether it is braked."""
 
     mount: Position
-    braked: Choice
+    braked: Annotated[Choice, SOURCED]
     axle_direction: Direction | None = None
     inertia: Moment | None = None
 
     def parameters(self, name: str) -> dict[str, float | bool]:
         """Return the parameters of this wheel under the name ``wheel[k]``."""
         found: dict[str, float | bool] = {f"{name}.braked": self.braked.value}
-        found |= _components(f"{name}.mount", self.mount.si)
+        found |= _components(f"{name}.mount", self.mount.value)
         if self.axle_direction is not None:
-            found |= _components(f"{name}.axle_direction", self.axle_direction.si)
+            found |= _components(f"{name}.axle_direction", self.axle_direction.value)
         if self.inertia is not None:
-            found[f"{name}.inertia"] = self.inertia.si
+            found[f"{name}.inertia"] = self.inertia.value
         return found
 
 
@@ -175,22 +102,32 @@ class Groove(Strict):
 
 
 class RobotSpec(Strict):
-    """A robot of the catalogue.
+    """A robot.
 
     Attributes
     ----------
-    name : of the file, without its ending
     title : one line for people
     layout : ``top`` (the wheels above the rotors) or ``bottom`` (the robot stands on the line)
     """
 
-    name: str
     title: str
     layout: Literal["top", "bottom"]
     notes: str = ""
     body: Body
     contact: Groove
     wheel: Annotated[list[Wheel], Field(min_length=1, max_length=4)]
+    _path: Path = PrivateAttr(default=Path("robot.toml"))
+
+    @property
+    def name(self) -> str:
+        """The name of the file, without its ending."""
+        return self._path.stem
+
+    @property
+    def fmu_name(self) -> str:
+        """The name of the robot's FMU: a C identifier, whatever the file is called."""
+        name = re.sub("[^A-Za-z0-9_]", "_", self.name)
+        return name if name[0].isalpha() else f"robot_{name}"
 
     @property
     def n_wheels(self) -> int:
@@ -202,8 +139,8 @@ class RobotSpec(Strict):
         """Return the robot's parameters by the names of its variable table (SI)."""
         j = self.body.inertia_about_center_of_mass()
         entries = {"xx": (0, 0), "yy": (1, 1), "zz": (2, 2), "xy": (0, 1), "xz": (0, 2), "yz": (1, 2)}
-        found: dict[str, float | bool] = {"mass": self.body.mass.si}
-        found |= _components("center_of_mass", self.body.center_of_mass.si)
+        found: dict[str, float | bool] = {"mass": self.body.mass.value}
+        found |= _components("center_of_mass", self.body.center_of_mass.value)
         found |= {f"inertia.{name}": float(j[place]) for name, place in entries.items()}
         for k, wheel in enumerate(self.wheel, start=1):
             found |= wheel.parameters(f"wheel[{k}]")
@@ -212,19 +149,19 @@ class RobotSpec(Strict):
     @property
     def contact_parameters(self) -> dict[str, float]:
         """Return the contact's parameters that belong to the wheel (SI)."""
-        return {name: getattr(self.contact, name).si for name in Groove.model_fields}
+        return {name: getattr(self.contact, name).value for name in Groove.model_fields}
 
     def assumptions(self) -> dict[str, str]:
         """Return key → reason of everything assumed."""
         return dict(_assumptions("", self))
 
 
-def _components(name: str, vector: np.ndarray) -> dict[str, float]:
+def _components(name: str, vector: tuple[float, float, float]) -> dict[str, float]:
     return {f"{name}.{axis}": float(value) for axis, value in zip("xyz", vector, strict=True)}
 
 
 def _assumptions(place: str, part: Any) -> list[tuple[str, str]]:
-    if isinstance(part, Stated):
+    if isinstance(part, Quantity):
         return [(place, part.reason or "")] if part.source == ASSUMED else []
     if isinstance(part, list):
         return [found for k, item in enumerate(part, 1) for found in _assumptions(f"{place}[{k}]", item)]
@@ -235,75 +172,70 @@ def _assumptions(place: str, part: Any) -> list[tuple[str, str]]:
 
 
 def load_robot(name_or_path: str | Path) -> RobotSpec:
-    """Return the robot of a catalogue name, or of a path that ends in ``.toml``; else raise `RobotError`."""
-    path = Path(name_or_path)
-    if path.suffix != ".toml":
-        path = FOLDER / f"{name_or_path}.toml"
-        if path.parent != FOLDER or not path.is_file():
-            names = sorted(file.stem for file in FOLDER.glob("*.toml"))
-            hint = _did_you_mean(str(name_or_path), names)
-            raise RobotError(f"robot {str(name_or_path)!r}: not in the catalogue ({', '.join(names)}){hint}")
-    return _parse(path)
+    """Return the robot of a catalogue name, or of a path that ends in ``.toml``; `InputError` says what is wrong."""
+    return _parse(_find(str(name_or_path), Path()))
 
 
 def catalogue() -> dict[str, RobotSpec]:
     """Return the robots of the catalogue by name."""
-    return {path.stem: _parse(path) for path in sorted(FOLDER.glob("*.toml"))}
+    return {name: load_robot(name) for name in names()}
+
+
+def names() -> list[str]:
+    """Return the names of the catalogue, whatever their files hold."""
+    return sorted(path.stem for path in FOLDER.glob("*.toml"))
+
+
+def is_file(name_or_path: str) -> bool:
+    """Whether a robot is named by its file, and not by its name in the catalogue."""
+    return name_or_path.endswith(".toml")
+
+
+def _find(name_or_path: str, folder: Path) -> Path:
+    """Return the file of a robot; a path is relative to `folder`."""
+    if is_file(name_or_path):
+        return folder / name_or_path
+    if name_or_path not in names():
+        hint = nearest(name_or_path, names()) or f"; choose {', '.join(names())}, or the path of a .toml file"
+        raise InputError(f"no robot {name_or_path!r} in the catalogue{hint}")
+    return FOLDER / f"{name_or_path}.toml"
 
 
 def _parse(path: Path) -> RobotSpec:
+    stack = Stack()
+    for file, document in chain(path, _find):
+        stack.put(_with_scaled_inertia(stack.document, document), str(file))
     try:
-        content = tomllib.loads(path.read_text(encoding="utf-8"))
-    except OSError as error:
-        raise RobotError(f"{path}: cannot be read ({error.strerror}); check the path") from error
-    except UnicodeDecodeError as error:
-        raise RobotError(f"{path}: is not UTF-8 text ({error.reason}); save it as UTF-8") from error
-    except tomllib.TOMLDecodeError as error:
-        raise RobotError(f"{path}: is not valid TOML ({error}); mend that line") from error
-    try:
-        return RobotSpec.model_validate({"name": path.stem} | content)
+        spec = RobotSpec.model_validate(stack.document)
     except ValidationError as error:
-        raise RobotError("\n".join(_word(path, found) for found in error.errors())) from error
+        found = complaints(error, RobotSpec)
+        raise InputError(f"{stack.place_of(one.path)}: {one}" for one in found) from None
+    spec._path = path
+    return spec
 
 
-def _word(path: Path, error: Any) -> str:
-    """Return one line: file, key, cause and cure."""
-    key = "".join(f"[{part + 1}]" if isinstance(part, int) else f".{part}" for part in error["loc"]).lstrip(".")
-    match error["type"]:
-        case "extra_forbidden":
-            parent, last = error["loc"][:-1], str(error["loc"][-1])
-            known = _known_keys(RobotSpec, parent)
-            return f"{path}: {key}: unknown key; known here: {', '.join(known)}{_did_you_mean(last, known)}"
-        case "missing":
-            return f"{path}: {key}: is missing; add it"
-        case "value_error":
-            return f"{path}: {key}: {error['ctx']['error']}"
-    cure = 'a number is written { value = 1.5, unit = "m", source = "..." }'
-    if error["loc"][-1] == "value" or error["type"] not in ("model_type", "model_attributes_type"):
-        cure = f"found {error['input']!r}"
-    return f"{path}: {key}: {error['msg']}; {cure}"
+def _with_scaled_inertia(below: Document, above: Document) -> Document:
+    """Return `above` with the inertia of `below` in proportion to the mass, where `above` has another mass alone.
+
+    The shape is kept: every part becomes heavier or lighter by the same factor. What is no number yet is left to the check.
+    """
+    there, here = (document.get("body") for document in (below, above))
+    if not (isinstance(there, dict) and isinstance(here, dict)) or "mass" not in here or "inertia" in here:
+        return above
+    try:
+        ratio = _mass(here) / _mass(there)
+    except (TypeError, KeyError, ValueError, ZeroDivisionError):
+        return above
+    inertia = there.get("inertia", {})
+    return above | {"body": here | {"inertia": {axes: _scaled(moment, ratio) for axes, moment in inertia.items()}}}
 
 
-def _known_keys(model: type[BaseModel], place: tuple[str | int, ...]) -> list[str]:
-    """Return the keys known at `place`, by walking down the models."""
-    for part in place:
-        if isinstance(part, str):
-            model = _model_of(model.model_fields[part].annotation)
-    return [name for name in model.model_fields if name != "name" or model is not RobotSpec]
+def _scaled(moment: Any, ratio: float) -> Any:
+    if not (isinstance(moment, dict) and isinstance(moment.get("value"), float | int)):
+        return moment
+    source = f"{moment.get('source')}; scaled by {ratio:.6g} with the mass"
+    return moment | {"value": ratio * moment["value"], "source": source}
 
 
-def _model_of(annotation: Any) -> type[BaseModel]:
-    """Return the model inside ``Model``, ``list[Model]`` or ``Annotated[Model, ...] | None``."""
-    if isinstance(annotation, type) and issubclass(annotation, BaseModel):
-        return annotation
-    inner = getattr(annotation, "__origin__", None)
-    candidates = [inner, *getattr(annotation, "__args__", ())]
-    for candidate in candidates:
-        if candidate not in (None, list, type(None)):
-            return _model_of(candidate)
-    raise TypeError(f"no model in {annotation}")
-
-
-def _did_you_mean(word: str, known: list[str]) -> str:
-    near = difflib.get_close_matches(word, known, n=1, cutoff=0.5)
-    return f". Did you mean {near[0]!r}?" if near else ""
+def _mass(body: Document) -> float:
+    return convert(body["mass"]["value"], body["mass"]["unit"], "kg")

@@ -18,7 +18,7 @@ from fmus.cable.assembly import HALF_BANDWIDTH, Model, element_work, interpolate
 from fmus.cable.module import Cable
 from fmus.module.variables import ModuleError
 from orchestrator.coupling.errors import InputError
-from orchestrator.scenario.types import Scenario
+from orchestrator.scenario.types import GraphScenario, Scenario
 
 N_POINTS = 201
 DENSE = 400
@@ -59,7 +59,7 @@ def of_scenario(scenario: Scenario, count: int) -> CableModes:
     """Return the first `count` modes of either kind of the scenario's cable, without the robot."""
     if count < 1:
         raise InputError(f"--count {count}: must be 1 or more")
-    if scenario.cable is None:
+    if isinstance(scenario, GraphScenario):
         raise InputError(f"{scenario.path}: cable: there is none; modes are those of a landing's cable")
     if scenario.cable.fmu is not None:
         raise InputError(f"{scenario.path}: cable.fmu: the modes of a foreign cable are not known; leave `fmu` out")

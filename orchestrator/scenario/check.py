@@ -3,150 +3,148 @@
 from __future__ import annotations
 
 from collections.abc import Iterator, Mapping
-from dataclasses import dataclass
+from dataclasses import replace
 from pathlib import Path
 from typing import Any, TypeGuard
 
+from fmus.module.units import UnitError, convert
+from fmus.module.variables import Variable
 from orchestrator.catalogue import modules as vocabulary
+from orchestrator.catalogue.documents import Document
+from orchestrator.catalogue.quantities import Complaint, Scalar
 from orchestrator.coupling.errors import InputError, nearest
-from orchestrator.coupling.masters.options import master_options
-from orchestrator.scenario.types import DEFAULT_MASTER, Provenance, Scalar
+from orchestrator.coupling.masters.options import master_options, out_of_bounds
+from orchestrator.scenario.types import DEFAULT_MASTER, UNITS, Provenance
 
-Document = dict[str, Any]
-UNITS = {
-    "simulation.stop_time": "s",
-    "simulation.macro_step": "s",
-    "simulation.timeout": "s",
-    "landing.position": "m",
-    "landing.height": "m",
-    "landing.velocity": "m/s",
-}
-POSITIVE = {
-    "cable": {
-        "span",
-        "unstretched_length",
-        "n_elements",
-        "axial_stiffness",
-        "linear_density",
-        "integration_step",
-    },
-    "robot": {"mass", "inertia.xx", "inertia.yy", "inertia.zz"},
-    "contact": {"stiffness", "exponent", "wheel_radius", "groove_angle", "groove_width", "cable_diameter"}
-    | {"max_contact_length"},
-    "master": {"tolerance", "absolute", "max_iterations", "relaxation", "mixing", "difference", "inner_tolerance"}
-    | {"inner_iterations", "slow", "refresh"},
-}
-NON_NEGATIVE = {
-    "cable": {"bending_stiffness", "damping_time", "spectral_radius", "gravity"},
-    "robot": {"gravity"},
-    "contact": {"damping", "friction_coefficient"},
-    "master": {"max_depth", "local_tolerance", "reuse", "depth", "threshold"},
-}
+Known = Mapping[str, Mapping[str, Variable]]
+"""Section → its variables by name."""
+GROUPS = {"parameters": "parameter", "inputs": "input"}
+"""Table of a section → causality of the variables that it sets."""
 
 
-@dataclass(frozen=True)
-class Problem:
-    """What is wrong with the value at `path`."""
+def known_variables(document: Document) -> tuple[Known, list[Complaint]]:
+    """Return the variables of every section that stands for an FMU, and what is wrong with those that have none."""
+    known: dict[str, Mapping[str, Variable]] = {}
+    problems: list[Complaint] = []
+    for path, kind, section in _sections(document):
+        fmu = section.get("fmu")
+        try:
+            known[path] = vocabulary.of_fmu(Path(fmu)) if isinstance(fmu, str) else _own(kind, section)
+        except InputError as error:
+            problems += [Complaint(f"{path}.{'fmu' if fmu else 'model'}", problem) for problem in error.problems]
+    return known, problems
 
-    path: str
-    message: str
 
-
-def check(document: Document, provenance: Mapping[str, Provenance]) -> Iterator[Problem]:
-    """Yield what the types cannot see: names, kinds, units and bounds of parameters, places, files."""
-    for path, unit in UNITS.items():
-        yield from _unit_problems(path, provenance, unit)
-    for section in ("cable", "robot", "contact"):
-        if isinstance(document.get(section), dict):
-            yield from _component_problems(section, section, document[section], provenance)
-    components = document.get("components", {})
-    for name, section in components.items() if isinstance(components, dict) else ():
+def _sections(document: Document) -> Iterator[tuple[str, str, Document]]:
+    """Yield path, kind (of a landing) and content of every section that stands for an FMU."""
+    for kind in ("cable", "robot", "contact"):
+        if isinstance(document.get(kind), dict):
+            yield kind, kind, document[kind]
+    for name, section in _table(document, "components").items():
         if isinstance(section, dict):
-            yield from _component_problems(f"components.{name}", "", section, provenance)
-    yield from _choice_problems(document)
-    yield from _step_problems(document)
-    yield from _position_problems(document)
+            yield f"components.{name}", "", section
 
 
-def _component_problems(
-    path: str, kind: str, section: Document, provenance: Mapping[str, Provenance]
-) -> Iterator[Problem]:
-    fmu = section.get("fmu")
-    try:
-        known = vocabulary.of_fmu(Path(fmu)) if isinstance(fmu, str) else _own(kind, section)
-    except InputError as error:
-        yield from (Problem(f"{path}.{'fmu' if fmu else 'model'}", problem) for problem in error.problems)
-        return
-    for group, causality in (("parameters", "parameter"), ("inputs", "input")):
-        values = section.get(group, {})
-        for name, value in values.items() if isinstance(values, dict) else ():
-            place = f"{path}.{group}.{name}"
-            names = [v.name for v in known.values() if v.causality == causality]
-            if name not in names:
-                other = f"is no {causality}; its causality is {known[name].causality}" if name in known else ""
-                yield Problem(place, other or f"unknown key{nearest(name, names)}")
-                continue
-            yield from _value_problems(place, known[name], value)
-            yield from _unit_problems(place, provenance, known[name].unit)
-            yield from _bound_problems(place, kind, name, value)
-
-
-def _own(kind: str, section: Document) -> dict[str, vocabulary.Variable]:
+def _own(kind: str, section: Document) -> dict[str, Variable]:
     """Return the variables of our own module: a landing's `kind`, or a component's `model`."""
-    if kind:
-        return vocabulary.of_module(kind, section.get("model"))
     model = section.get("model")
+    if kind:
+        return vocabulary.of_module(kind, model if isinstance(model, str) else None)
     if isinstance(model, str) and model not in vocabulary.MODELS:
         raise InputError(f"no model {model!r}{nearest(model, vocabulary.MODELS)}")
     return vocabulary.of_module(model) if isinstance(model, str) else {}
 
 
-def _value_problems(path: str, variable: vocabulary.Variable, value: Any) -> Iterator[Problem]:
+# -- units -------------------------------------------------------------------------------------------------------
+
+
+def to_si(document: Document, known: Known, provenance: dict[str, Provenance], prefix: str = "") -> Iterator[Complaint]:
+    """Convert the values that give a unit to the unit wanted, in place; yield what does not convert."""
+    for key, value in document.items():
+        path = prefix + key
+        if isinstance(value, dict):
+            yield from to_si(value, known, provenance, f"{path}.")
+            continue
+        given, wanted = provenance[path].unit, _unit_of(path, known)
+        if given is None or wanted is None or given == wanted:
+            continue
+        try:
+            document[key] = _converted(value, given, wanted)
+            provenance[path] = replace(provenance[path], written=f"{value} {given}")
+        except UnitError as error:
+            yield Complaint(path, str(error))
+
+
+def _converted(value: Any, given: str, wanted: str) -> Any:
+    if _is_number(value):
+        return convert(value, given, wanted)
+    raise UnitError(f"{value!r} is no number and has no unit")
+
+
+def _unit_of(path: str, known: Known) -> str | None:
+    """Return the unit in which the value at `path` is wanted; None if there is no such variable."""
+    for section, variables in known.items():
+        for group in GROUPS:
+            if path.startswith(f"{section}.{group}."):
+                variable = variables.get(path.removeprefix(f"{section}.{group}."))
+                return (variable.unit or "1") if variable is not None else None
+    return UNITS.get(path, "1")
+
+
+# -- values ------------------------------------------------------------------------------------------------------
+
+
+def check(document: Document, known: Known) -> Iterator[Complaint]:
+    """Yield what the types cannot see: names, kinds and bounds of parameters, masters, places."""
+    for path, _, section in _sections(document):
+        if path in known:
+            yield from _section_problems(path, section, known[path])
+    yield from _master_problems(document)
+    yield from _step_problems(document)
+    yield from _position_problems(document, known)
+
+
+def _section_problems(path: str, section: Document, known: Mapping[str, Variable]) -> Iterator[Complaint]:
+    for group, causality in GROUPS.items():
+        names = [v.name for v in known.values() if v.causality == causality]
+        for name, value in _table(section, group).items():
+            place = f"{path}.{group}.{name}"
+            if name in names:
+                yield from _value_problems(place, known[name], value)
+            elif name in known:
+                yield Complaint(place, f"is no {causality}; its causality is {known[name].causality}")
+            else:
+                yield Complaint(place, f"unknown key{nearest(name, names)}")
+
+
+def _value_problems(path: str, variable: Variable, value: Any) -> Iterator[Complaint]:
     if not isinstance(value, Scalar):
         return  # the types have said so
     wanted = {"real": (int, float), "integer": int, "boolean": bool, "string": str}[variable.kind]
     is_bool = isinstance(value, bool)
     if not isinstance(value, wanted) or is_bool != (variable.kind == "boolean"):
-        yield Problem(path, f"{value!r} is not of type {variable.kind}")
+        yield Complaint(path, f"{value!r} is not of type {variable.kind}")
     elif isinstance(value, float) and not abs(value) < float("inf"):
-        yield Problem(path, f"{value!r} must be a finite number")
+        yield Complaint(path, f"{value!r} must be a finite number")
     elif variable.choices and value not in variable.choices:
-        yield Problem(path, f"{value!r} is not one of {', '.join(variable.choices)}")
+        yield Complaint(path, f"{value!r} is not one of {', '.join(variable.choices)}")
+    elif _is_number(value) and not variable.bounds.admit(value):
+        yield Complaint(path, f"{value!r} must be {variable.bounds}")
 
 
-def _unit_problems(path: str, provenance: Mapping[str, Provenance], wanted: str) -> Iterator[Problem]:
-    given = provenance[path].unit if path in provenance else None
-    if given is not None and given != (wanted or "1"):
-        yield Problem(path, f"unit is {given}; {wanted or '1'} is wanted, convert the value")
-
-
-def _bound_problems(path: str, kind: str, name: str, value: Any) -> Iterator[Problem]:
-    if not _is_number(value):
-        return
-    if name in POSITIVE.get(kind, ()) and value <= 0:
-        yield Problem(path, f"{value!r} must be greater than 0")
-    if name in NON_NEGATIVE.get(kind, ()) and value < 0:
-        yield Problem(path, f"{value!r} must not be negative")
-
-
-def _choice_problems(document: Document) -> Iterator[Problem]:
-    """Yield a master or robot that does not exist, and options that a master does not have."""
-    simulation, robot, options = (_table(document, key) for key in ("simulation", "robot", "master"))
-    name, model = simulation.get("master", DEFAULT_MASTER), robot.get("model")
+def _master_problems(document: Document) -> Iterator[Complaint]:
+    """Yield a master that does not exist, and options that it does not have or that are out of bounds."""
+    name, options = _table(document, "simulation").get("master", DEFAULT_MASTER), _table(document, "master")
     masters = master_options()
     if isinstance(name, str) and name not in masters:
-        yield Problem("simulation.master", f"no master {name!r}{nearest(name, masters)}")
+        yield Complaint("simulation.master", f"no master {name!r}{nearest(name, masters)}")
     for key, value in options.items() if name in masters else ():
         if key not in masters[name]:
-            yield Problem(f"master.{key}", f"unknown key for master {name}{nearest(key, masters[name])}")
+            yield Complaint(f"master.{key}", f"unknown key for master {name}{nearest(key, masters[name])}")
         elif not _is_like(value, masters[name][key]):
-            wanted = type(masters[name][key]).__name__
-            yield Problem(f"master.{key}", f"{value!r} is not of type {wanted}")
-        else:
-            yield from _bound_problems(f"master.{key}", "master", key, value)
-    robots = vocabulary.robots()
-    if isinstance(model, str) and model not in robots:
-        yield Problem("robot.model", f"no robot {model!r} in the catalogue{nearest(model, robots)}")
+            yield Complaint(f"master.{key}", f"{value!r} is not of type {type(masters[name][key]).__name__}")
+        elif _is_number(value) and (wanted := out_of_bounds(name, key, value)):
+            yield Complaint(f"master.{key}", f"{value!r} must be {wanted}")
 
 
 def _is_like(value: Any, default: Any) -> bool:
@@ -156,14 +154,14 @@ def _is_like(value: Any, default: Any) -> bool:
     return type(value) is type(default) or default is None
 
 
-def _step_problems(document: Document) -> Iterator[Problem]:
+def _step_problems(document: Document) -> Iterator[Complaint]:
     simulation = _table(document, "simulation")
     stop, step = simulation.get("stop_time"), simulation.get("macro_step")
     if not (_is_number(stop) and _is_number(step) and 0.0 < step < float("inf") and 0.0 < stop < float("inf")):
         return
     n = max(1, round(stop / step))
     if abs(n * step - stop) > 1e-9 * stop:
-        yield Problem(
+        yield Complaint(
             "simulation.macro_step", f"{step:g} s does not divide stop_time {stop:g} s; {stop / n:.6g} s does"
         )
 
@@ -172,13 +170,13 @@ def _is_number(value: Any) -> TypeGuard[float]:
     return isinstance(value, int | float) and not isinstance(value, bool)
 
 
-def _position_problems(document: Document) -> Iterator[Problem]:
-    position = _table(document, "landing").get("position")
-    span = _table(_table(document, "cable"), "parameters").get("span")
-    if span is None and "fmu" not in _table(document, "cable"):
-        span = vocabulary.of_module("cable")["span"].start
+def _position_problems(document: Document, known: Known) -> Iterator[Complaint]:
+    position, cable = _table(document, "landing").get("position"), _table(document, "cable")
+    span = _table(cable, "parameters").get("span")
+    if span is None and "fmu" not in cable and "cable" in known:
+        span = known["cable"]["span"].start
     if _is_number(position) and _is_number(span) and 0 < span < float("inf") and not 0 < position < span:
-        yield Problem("landing.position", f"{position:g} m is off the span; it must lie within 0 … {span:g} m")
+        yield Complaint("landing.position", f"{position:g} m is off the span; it must lie within 0 … {span:g} m")
 
 
 def _table(document: Document, key: str) -> Document:

@@ -1,16 +1,16 @@
 """Scenario files: TOML, parsed once into types; the only place where dictionaries of settings live.
 
 A scenario is either a landing (``[cable]``, ``[robot]``, ``[contact]``, ``[landing]``) or a general graph of
-FMUs (``[components.NAME]`` and ``connections``). Every value may be bare or a table
-``{ value, source, reason, unit }`` that says where the number comes from.
+FMUs (``[components.NAME]`` and ``connections``). Every value may be bare or a quantity
+``{ value, unit, source, reason }`` that says where the number comes from.
 """
 
 from __future__ import annotations
 
-from collections.abc import Mapping
+from collections.abc import Iterable, Mapping
 from dataclasses import dataclass
 from pathlib import Path
-from typing import Annotated, Any, Literal
+from typing import Annotated, Any, Literal, Self
 
 from pydantic import (
     AfterValidator,
@@ -22,10 +22,13 @@ from pydantic import (
 )
 
 from orchestrator.catalogue import modules as vocabulary
-
-Scalar = bool | int | float | str
+from orchestrator.catalogue.quantities import Scalar
 
 DEFAULT_MASTER = "iqn_ils"
+
+
+class ScenarioNote(UserWarning):
+    """What was decided in reading a scenario that its author may not expect."""
 
 
 class Section(BaseModel):
@@ -46,26 +49,33 @@ Count = Annotated[int, Field(ge=1)]
 NonNegative = Annotated[float, Field(ge=0.0)]
 
 
+@dataclass(frozen=True)
+class In:
+    """The unit of a field: quantities are converted to it, bare numbers stand in it."""
+
+    unit: str
+
+
 class Simulation(Section):
     """Times in s. `tolerances`: the largest `relative_max_error` that `compare` lets pass, by signal.
 
-    `estimate`: by which second run `run` estimates the error of those signals, if any (docs/estimate.md). `timeout`: wall
+    `estimate`: by which second run `run` estimates the error of those signals, if any (docs/concepts/error.md). `timeout`: wall
     time that an FMU may take for one step or its initialisation; none: as long as it likes.
     """
 
-    stop_time: Positive
-    macro_step: Positive
+    stop_time: Annotated[Positive, In("s")]
+    macro_step: Annotated[Positive, In("s")]
     master: str = DEFAULT_MASTER
     exchange: Literal["point", "hermite", "waveform"] | None = None
     tolerances: dict[str, Positive] = {}
     estimate: Literal["finer", "coarser", "none"] = "finer"
-    timeout: Positive | None = None
+    timeout: Annotated[Positive | None, In("s")] = None
 
 
 class CableSection(Section):
     """The cable: parameters by their names in the contract; `fmu` is a foreign one instead of ours.
 
-    `steps`, here and below: steps that the FMU makes in each step of the master (docs/masters.md).
+    `steps`, here and below: steps that the FMU makes in each step of the master (docs/reference/masters.md).
     """
 
     fmu: str | None = None
@@ -75,7 +85,7 @@ class CableSection(Section):
 
 
 class RobotSection(Section):
-    """The robot: one of the catalogue (`model`) or any FMU that meets the contract (`fmu`).
+    """The robot: one of the catalogue or a TOML file like those there (`model`), or any FMU of the contract (`fmu`).
 
     `inputs` are held over the whole run: thrust, control torque, drive torques of the wheels.
     """
@@ -89,7 +99,7 @@ class RobotSection(Section):
     @model_validator(mode="after")
     def _one_robot(self) -> RobotSection:
         if (self.model is None) == (self.fmu is None):
-            raise ValueError('give either model = "NAME" (see `orchestrator list`) or fmu = "FILE.fmu"')
+            raise ValueError('give either model = "NAME" (see `orchestrator list`) or "FILE.toml", or fmu = "FILE.fmu"')
         return self
 
 
@@ -100,7 +110,7 @@ class ContactSection(Section):
     parameters: Settings = {}
 
 
-class Landing(Section):
+class LandingSection(Section):
     """Where and how the robot comes down.
 
     Attributes
@@ -110,9 +120,9 @@ class Landing(Section):
     velocity : m/s downwards
     """
 
-    position: float
-    height: NonNegative = 0.0
-    velocity: NonNegative = 0.0
+    position: Annotated[float, In("m")]
+    height: Annotated[NonNegative, In("m")] = 0.0
+    velocity: Annotated[NonNegative, In("m/s")] = 0.0
 
 
 class Component(Section):
@@ -133,37 +143,34 @@ class Component(Section):
 
 @dataclass(frozen=True)
 class Provenance:
-    """Where a value comes from; `source` is ``assumed`` only together with a `reason`."""
+    """Where a value comes from.
+
+    Attributes
+    ----------
+    source : ``scenario`` or ``command line`` if the value names none; ``assumed`` only together with a `reason`
+    unit : in which it was written, None if it was bare
+    written : how it was written, where that was another unit than the variable's: ``18 mm``
+    file : which says it; empty on the command line
+    sha256 : of the file that the value names, where that is a robot's
+    """
 
     source: str = "scenario"
     reason: str = ""
     unit: str | None = None
+    written: str = ""
+    file: str = ""
+    sha256: str = ""
 
 
-class Scenario(Section):
-    """One scenario, checked; `provenance` tells where each value comes from, by its path."""
+class _Common(Section):
+    """What every scenario has; `provenance` tells where each value comes from, by its path."""
 
     title: str
     simulation: Simulation
     master: Settings = {}
-    cable: CableSection | None = None
-    robot: RobotSection | None = None
-    contact: ContactSection = ContactSection()
-    landing: Landing | None = None
-    components: dict[str, Component] = {}
-    connections: list[str] = []
     _path: Path = PrivateAttr(default=Path("scenario.toml"))
     _provenance: dict[str, Provenance] = PrivateAttr(default_factory=dict)
-
-    @model_validator(mode="after")
-    def _one_kind(self) -> Scenario:
-        parts = {"cable": self.cable, "robot": self.robot, "landing": self.landing}
-        missing = [name for name, part in parts.items() if part is None]
-        if self.components and len(missing) < len(parts):
-            raise ValueError("has both components and a landing; give one of them")
-        if not self.components and missing:
-            raise ValueError(f"{', '.join(missing)}: missing; a landing needs cable, robot and landing")
-        return self
+    _notes: tuple[str, ...] = PrivateAttr(default=())
 
     @property
     def name(self) -> str:
@@ -181,15 +188,48 @@ class Scenario(Section):
         return self._provenance
 
     @property
-    def is_landing(self) -> bool:
-        """Whether this is a landing and not a general graph."""
-        return self.landing is not None
+    def notes(self) -> tuple[str, ...]:
+        """What was decided in reading it that its author may not expect, a line each."""
+        return self._notes
 
-    def changed(self, options: Settings | None = None, **simulation: Any) -> Scenario:
+    def read_from(self, path: Path, provenance: Mapping[str, Provenance], notes: Iterable[str] = ()) -> Self:
+        """Note the file that the scenario comes from, where each of its values does, and what is to be said; return it."""
+        self._path, self._provenance, self._notes = path, dict(provenance), tuple(notes)
+        return self
+
+    def changed(self, options: Settings | None = None, **simulation: Any) -> Self:
         """Return a copy with other simulation settings (macro_step, …) and master `options`, checked again."""
         document = self.model_dump()
         document["simulation"] |= simulation
         document["master"] = document["master"] if options is None else options
-        copy = Scenario.model_validate(document)
-        copy._path, copy._provenance = self._path, self._provenance
-        return copy
+        return type(self).model_validate(document).read_from(self._path, self._provenance, self._notes)
+
+
+class LandingScenario(_Common):
+    """A robot comes down on a cable: cable, robot, one contact a wheel, and where they meet."""
+
+    cable: CableSection
+    robot: RobotSection
+    contact: ContactSection = ContactSection()
+    landing: LandingSection
+
+
+class GraphScenario(_Common):
+    """A general graph: any FMUs by name, and what is connected to what (``"a.x -> b.u"``)."""
+
+    components: Annotated[dict[str, Component], Field(min_length=1)]
+    connections: list[str] = []
+
+
+Scenario = LandingScenario | GraphScenario
+"""One scenario, checked; `isinstance` tells which kind."""
+
+
+UNITS = {
+    f"{section}.{name}": marker.unit
+    for section, model in (("simulation", Simulation), ("landing", LandingSection))
+    for name, field in model.model_fields.items()
+    for marker in field.metadata
+    if isinstance(marker, In)
+}
+"""Units of the values that belong to no FMU, by their path."""

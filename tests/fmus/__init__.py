@@ -11,6 +11,7 @@ from functools import cache
 from pathlib import Path
 
 import numpy as np
+import pytest
 from fmpy import platform, platform_tuple
 from fmpy.fmi2 import FMU2Model, FMU2Slave
 from fmpy.fmi3 import FMU3Model, FMU3ScheduledExecution, FMU3Slave
@@ -52,6 +53,9 @@ def compiler() -> str | None:
     return shutil.which("cc") or shutil.which("gcc")
 
 
+needs_compiler = pytest.mark.skipif(compiler() is None, reason="no C compiler on this machine")
+
+
 @cache
 def compiled(name: str) -> Path:
     """Compile a test FMU in C, ``lag2``, ``field2`` … (FMI 2.0) or ``lag3``, ``field3`` (FMI 3.0), on Linux; return it."""
@@ -83,6 +87,26 @@ def fmu(kind: str, name: str, *, rollback: bool = True, steps: int = 1, **parame
     made = instance(build(kind, rollback=rollback), name, steps)
     made.set_parameters(parameters)
     return made
+
+
+def started(instance: Fmu) -> Fmu:
+    """Initialise an instance at t = 0 and return it."""
+    instance.enter_initialization(0.0)
+    instance.exit_initialization()
+    return instance
+
+
+def described(path: Path, folder: Path, *changes: tuple[str, str]) -> Path:
+    """Copy an FMU with parts of its model description replaced."""
+    copy = folder / f"changed_{path.name}"
+    with zipfile.ZipFile(path) as old, zipfile.ZipFile(copy, "w") as new:
+        for name in old.namelist():
+            content = old.read(name)
+            for before, after in changes if name == "modelDescription.xml" else ():
+                assert before.encode() in content
+                content = content.replace(before.encode(), after.encode())
+            new.writestr(name, content)
+    return copy
 
 
 MILD = {"stiffness": 100.0, "damping": 1.0, "ground": 1000.0, "start": (0.1, 0.0)}

@@ -10,7 +10,7 @@ from __future__ import annotations
 
 from pathlib import Path
 
-from orchestrator.runs.reference import reference
+from orchestrator.runs.reference import solve_reference
 from verification.exchange.landing import balance, coupled, impulse, relative_error, scenario
 from verification.study import Result, Row
 
@@ -24,7 +24,7 @@ def rows(stiffness: float) -> list[Row]:
     """Return the rows of one wall stiffness."""
     settings = "drop_5cm", TOUCH + WINDOW + 0.1, f"contact.parameters.stiffness={stiffness:g}"
     made, tight = scenario(*settings), scenario(*settings, "master.tolerance=1e-9")
-    monolithic = reference(made, MACRO_STEPS).table
+    monolithic = solve_reference(made, MACRO_STEPS).table
     exact = impulse(made, monolithic, TOUCH, TOUCH + WINDOW)
     found = []
     for step in MACRO_STEPS:

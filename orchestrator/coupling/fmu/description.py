@@ -9,6 +9,7 @@ import re
 import tempfile
 import zipfile
 from dataclasses import dataclass
+from functools import lru_cache
 from pathlib import Path
 from typing import Any, Literal
 from xml.etree import ElementTree
@@ -17,7 +18,8 @@ import fmpy
 import numpy as np
 from fmpy.model_description import ModelDescription, ModelVariable
 
-KINDS: dict[str, str] = {
+Kind = Literal["real", "integer", "boolean", "string", "binary", "clock"]
+KINDS: dict[str, Kind] = {
     "Real": "real",
     "Float64": "real",
     "Float32": "real",
@@ -39,7 +41,7 @@ class Port:
     name: str
     vr: int
     unit: str
-    kind: Literal["real", "integer", "boolean", "string", "binary", "clock"]
+    kind: Kind
     causality: str
     variability: str
     start: str | None
@@ -98,7 +100,7 @@ def element_names(variable: ModelVariable) -> list[str]:
 
 
 def ports_of(variable: ModelVariable) -> list[Port]:
-    kind: Any = KINDS.get(variable.type, "integer")
+    kind = KINDS.get(variable.type, "integer")
     unit = variable.unit or (variable.declaredType.unit if variable.declaredType else None) or ""
     size = int(np.prod(variable.shape)) if variable.shape else 1
     names = element_names(variable)
@@ -115,13 +117,39 @@ def ports_of(variable: ModelVariable) -> list[Port]:
     return [Port(name, variable.valueReference, *fixed, i) for i, name in enumerate(names)]
 
 
+def sha256_of(path: Path) -> str:
+    """Return the SHA-256 of a file as hexadecimal digits; each state of a file is read once."""
+    return _sha256(path, *_state(path))
+
+
+def parsed(path: Path) -> ModelDescription:
+    """Return FMPy's model description of the file as it now is; each state of a file is read once."""
+    return _parsed(path, *_state(path))
+
+
+def _state(path: Path) -> tuple[int, int]:
+    """Return what changes with the content of a file: the time it was written, ns, and its size."""
+    status = path.stat()
+    return status.st_mtime_ns, status.st_size
+
+
+@lru_cache(maxsize=32)
+def _parsed(path: Path, *state: int) -> ModelDescription:
+    return fmpy.read_model_description(str(path), validate=False)
+
+
+@lru_cache(maxsize=32)
+def _sha256(path: Path, *state: int) -> str:
+    return hashlib.sha256(path.read_bytes()).hexdigest()
+
+
 def read_description(path: Path) -> tuple[ModelDescription, str]:
     """Return model description and SHA-256 of an FMU; `ValueError` says what is wrong with it."""
     if not path.is_file():
         raise ValueError(f"{path}: no such file; build the FMUs, or correct the path")
-    sha256 = hashlib.sha256(path.read_bytes()).hexdigest()
+    sha256 = sha256_of(path)
     try:
-        description = fmpy.read_model_description(str(path), validate=False)
+        description = parsed(path)
     except Exception as error:
         raise ValueError(f"{path}: not an FMU ({error})") from error
     if description.coSimulation is None:

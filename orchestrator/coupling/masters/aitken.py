@@ -7,7 +7,9 @@ from typing import Any, ClassVar
 import numpy as np
 
 from orchestrator.coupling.graph.graph import Graph
-from orchestrator.coupling.stepping.implicit import Accelerator, Implicit
+from orchestrator.coupling.stepping.accelerator import Accelerator
+from orchestrator.coupling.stepping.bounds import Positive
+from orchestrator.coupling.stepping.implicit import Implicit
 
 
 class Aitken(Implicit):
@@ -29,7 +31,7 @@ class Aitken(Implicit):
     NAME: ClassVar[str] = "aitken"
     TITLE: ClassVar[str] = "implicit, fixed-point iteration, Aitken's relaxation"
 
-    def __init__(self, graph: Graph, *, relaxation: float = 0.5, **options: Any):
+    def __init__(self, graph: Graph, *, relaxation: Positive = 0.5, **options: Any):
         super().__init__(graph, Dynamic(relaxation), **options)
 
 

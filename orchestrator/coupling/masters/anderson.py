@@ -5,6 +5,7 @@ from __future__ import annotations
 from typing import Any, ClassVar
 
 from orchestrator.coupling.graph.graph import Graph
+from orchestrator.coupling.stepping.bounds import Count, NonNegative, Positive
 from orchestrator.coupling.stepping.implicit import Implicit
 from orchestrator.coupling.stepping.least_squares import LeastSquares
 
@@ -34,9 +35,9 @@ class Anderson(Implicit):
         self,
         graph: Graph,
         *,
-        mixing: float = 0.5,
-        depth: int = 12,
-        threshold: float = 1e-6,
+        mixing: Positive = 0.5,
+        depth: Count = 12,
+        threshold: NonNegative = 1e-6,
         **options: Any,
     ):
         model = LeastSquares(graph.torn.size, 0, threshold, mixing, mixing=mixing, depth=depth)

@@ -7,7 +7,9 @@ from typing import Any, ClassVar
 import numpy as np
 
 from orchestrator.coupling.graph.graph import Graph
-from orchestrator.coupling.stepping.implicit import Accelerator, Implicit
+from orchestrator.coupling.stepping.accelerator import Accelerator
+from orchestrator.coupling.stepping.bounds import Positive
+from orchestrator.coupling.stepping.implicit import Implicit
 
 
 class FixedPoint(Implicit):
@@ -28,7 +30,7 @@ class FixedPoint(Implicit):
     NAME: ClassVar[str] = "fixed_point"
     TITLE: ClassVar[str] = "implicit, fixed-point iteration, constant relaxation"
 
-    def __init__(self, graph: Graph, *, relaxation: float = 0.7, **options: Any):
+    def __init__(self, graph: Graph, *, relaxation: Positive = 0.7, **options: Any):
         super().__init__(graph, Constant(relaxation), **options)
 
 

@@ -5,6 +5,7 @@ from __future__ import annotations
 from typing import Any, ClassVar
 
 from orchestrator.coupling.graph.graph import Graph
+from orchestrator.coupling.stepping.bounds import Count, NonNegative, Positive
 from orchestrator.coupling.stepping.implicit import Implicit
 from orchestrator.coupling.stepping.least_squares import LeastSquares
 
@@ -37,9 +38,9 @@ class IqnIls(Implicit):
         self,
         graph: Graph,
         *,
-        reuse: int = 8,
-        threshold: float = 1e-6,
-        relaxation: float = 0.1,
+        reuse: Count = 8,
+        threshold: NonNegative = 1e-6,
+        relaxation: Positive = 0.1,
         **options: Any,
     ):
         super().__init__(graph, LeastSquares(graph.torn.size, reuse, threshold, relaxation), **options)

@@ -6,14 +6,15 @@ from typing import ClassVar
 
 from orchestrator.coupling.graph.graph import Graph, Node
 from orchestrator.coupling.stepping.interpolation import History, Loads
-from orchestrator.coupling.stepping.master import Master, StepReport
+from orchestrator.coupling.stepping.master import Master
+from orchestrator.coupling.stepping.report import StepReport
 
 
 class Jacobi(Master):
     r"""Explicit, parallel: every input is extrapolated over the macro step from its past values.
 
     With p the polynomial of degree k through u(t), u(t - H), …, a component receives the mean of p over the
-    step, and the slope :math:`\\frac{12}{H^2} \\int p\\,(\\tau - t - H/2)\\,d\\tau` where it has an input
+    step, and the slope 12/H² ∫ p (tau - t - H/2) dtau where it has an input
     for it (``force_rate``). k = 0 is the classical held input.
 
     Order: k + 1, but at most 2 where an FMU has no input for the slope. Stability: explicit; about H <

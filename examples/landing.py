@@ -1,0 +1,19 @@
+"""A landing: 38 kg, 20 m from the tower of a 200 m span. What happens, and how far to trust it."""
+
+import orchestrator
+
+run = orchestrator.run("landing_200m_point9", stop=1.0)
+
+z = run.signals["robot.body.position.z"]
+roll = run.signals["robot.roll"]
+force = run.signals["contact1.normal_force"]
+
+lowest = int(z.values.argmin())
+print(f"goes down by {z[0] - z[lowest]:.3f} {z.unit}, lowest at t = {z.time[lowest]:.2f} s")
+print(f"rolls up to {abs(roll.values).max():.4f} {roll.unit}")
+print(f"the wheel carries up to {force.values.max():.0f} {force.unit}")
+
+# how wrong is this? The run says so itself, in each signal's unit
+for name, error in run.estimated_error.items():
+    print(f"{name}: about {error:.1e} {run.signals[name].unit} off")
+print("verdict:", run.verdict)

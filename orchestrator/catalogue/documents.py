@@ -1,0 +1,144 @@
+"""TOML files that build on one another: ``extends``, merged key by key; and which file says what."""
+
+from __future__ import annotations
+
+import tomllib
+from collections.abc import Callable, Iterable, Iterator
+from contextlib import contextmanager
+from contextvars import ContextVar
+from dataclasses import dataclass, field
+from pathlib import Path
+from typing import Any
+
+from orchestrator.coupling.errors import InputError
+
+Document = dict[str, Any]
+EXTENDS = "extends"
+
+
+def is_quantity(value: Any) -> bool:
+    """Whether `value` is a table that stands for one value and says where it comes from."""
+    return isinstance(value, dict) and "value" in value
+
+
+@dataclass
+class Stack:
+    """A document made of several: files that extend one another, then what the command line replaces.
+
+    Attributes
+    ----------
+    document : as it stands
+    layers : who said what, the last word last: a file's path (or an option) → the paths of its values
+    """
+
+    document: Document = field(default_factory=dict)
+    layers: list[tuple[str, frozenset[str]]] = field(default_factory=list)
+
+    def put(self, above: Document, place: str) -> None:
+        """Merge `above` into the document: its values win, tables merge key by key, arrays and quantities are replaced."""
+        self.document = merged(self.document, above)
+        self.note(place, leaves(above))
+
+    def note(self, place: str, paths: Iterable[str]) -> None:
+        """Note that `place` said what stands at `paths`."""
+        self.layers.append((place, frozenset(paths)))
+
+    def place_of(self, path: str) -> str:
+        """Return who spoke last of the value at `path`, of what it belongs to or of what belongs to it; else the last file."""
+        for place, paths in reversed(self.layers):
+            if path and any(_belongs(path, known) or _belongs(known, path) for known in paths):
+                return place
+        return next(place for place, _ in reversed(self.layers) if not place.startswith("--"))
+
+
+def _belongs(path: str, to: str) -> bool:
+    return path == to or path.startswith((f"{to}.", f"{to}["))
+
+
+def merged(below: Document, above: Document) -> Document:
+    """Return both documents as one; where both speak, `above` wins."""
+    found = dict(below)
+    for key, value in above.items():
+        there = found.get(key)
+        both = isinstance(value, dict) and isinstance(there, dict) and not (is_quantity(value) or is_quantity(there))
+        found[key] = merged(there, value) if both and isinstance(there, dict) else value
+    return found
+
+
+def leaves(document: Document, prefix: str = "") -> Iterator[str]:
+    """Yield the path of every value of `document`."""
+    for key, value in document.items():
+        if isinstance(value, dict) and value and not is_quantity(value):
+            yield from leaves(value, f"{prefix}{key}.")
+        else:
+            yield prefix + key
+
+
+_texts: ContextVar[dict[Path, str] | None] = ContextVar("texts", default=None)
+
+
+@contextmanager
+def read_once() -> Iterator[None]:
+    """Within it each file is read once, so that a command sees one state of it, however many ask."""
+    if _texts.get() is not None:
+        yield
+        return
+    token = _texts.set({})
+    try:
+        yield
+    finally:
+        _texts.reset(token)
+
+
+def _text(path: Path) -> str:
+    known = _texts.get()
+    if known is None:
+        return path.read_text(encoding="utf-8")
+    place = path.resolve()
+    if place not in known:
+        known[place] = path.read_text(encoding="utf-8")
+    return known[place]
+
+
+def read(path: Path) -> Document:
+    """Return the content of a TOML file; `InputError` names file, cause and cure."""
+    try:
+        return tomllib.loads(_text(path))
+    except OSError as error:
+        raise InputError(f"{path}: cannot be read ({error.strerror}); check the path") from None
+    except UnicodeDecodeError as error:
+        raise InputError(f"{path}: not a TOML file: no UTF-8 text ({error.reason}); save it as UTF-8") from None
+    except tomllib.TOMLDecodeError as error:
+        raise InputError(f"{path}: not a TOML file: {error}; mend that line") from None
+
+
+def chain(path: Path, find: Callable[[str, Path], Path]) -> list[tuple[Path, Document]]:
+    """Return the file at `path` and those that it extends, each with its content, the farthest base first.
+
+    Parameters
+    ----------
+    find : what ``extends = "…"`` names, and the folder of the file in which it stands → the file's path
+    """
+    found: list[tuple[Path, Document]] = []
+    base: Path | None = path
+    while base is not None:
+        if base.resolve() in [one.resolve() for one, _ in found]:
+            circle = " → ".join(str(one) for one in [*(one for one, _ in found), base])
+            raise InputError(
+                f"{found[-1][0]}: {EXTENDS}: {circle} is a circle; extend a file that does not lead back here"
+            )
+        document = read(base)
+        found.append((base, document))
+        base = _base(base, document.pop(EXTENDS, None), find)
+    return found[::-1]
+
+
+def _base(path: Path, name: Any, find: Callable[[str, Path], Path]) -> Path | None:
+    if name is None:
+        return None
+    if not isinstance(name, str):
+        raise InputError(f"{path}: {EXTENDS}: {name!r} must be a string: a name, or a path relative to this file")
+    try:
+        return find(name, path.parent)
+    except InputError as error:
+        raise InputError(f"{path}: {EXTENDS}: {problem}" for problem in error.problems) from None

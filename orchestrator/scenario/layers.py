@@ -1,0 +1,191 @@
+"""What a scenario's files and the options of a command say, laid over one another."""
+
+from __future__ import annotations
+
+import re
+import tomllib
+from collections.abc import Iterable, Iterator
+from pathlib import Path
+from typing import Any
+
+from orchestrator.catalogue import robot_spec
+from orchestrator.catalogue.documents import Document, Stack, chain, is_quantity, leaves
+from orchestrator.catalogue.scenarios import find
+from orchestrator.coupling.errors import InputError
+from orchestrator.coupling.masters.options import master_options
+from orchestrator.scenario.types import DEFAULT_MASTER
+
+NAMED_TABLES = ("parameters", "inputs", "tolerances")
+"""Tables whose keys are variables' names: the dots in them are part of the name."""
+SET = "--set"
+
+
+def files(path: Path) -> tuple[Stack, list[str]]:
+    """Return the scenario file at `path` over those that it extends, and what is to be said of it."""
+    stack, notes = Stack(), []
+    for file, document in chain(path, find):
+        named = named_tables(document)
+        resolve_paths(named, file.parent)
+        notes += lay(stack, named, str(file))
+    return stack, notes
+
+
+def lay(stack: Stack, above: Document, place: str) -> list[str]:
+    """Lay `above` over the stack; return what is to be said of it.
+
+    What belongs to another model does not stay: a section that names another model or FMU starts empty, another master
+    starts with its own defaults, the tolerance excepted.
+    """
+    notes = []
+    for section in _sections(above):
+        below = _table(stack.document, section)
+        if below is not None and _is_another(below, _table(above, section) or {}):
+            notes += _left_behind(section, below)
+            _drop(stack.document, section)
+    simulation = above.get("simulation")
+    if isinstance(simulation, dict) and "master" in simulation:
+        _make_room_for_master(stack.document, bare(simulation["master"]))
+    stack.put(above, place)
+    return notes
+
+
+def bare(value: Any) -> Any:
+    """Return the value of a quantity, or what is none as it is."""
+    return value["value"] if is_quantity(value) else value
+
+
+def _sections(document: Document) -> Iterator[tuple[str, ...]]:
+    """Yield the places of the sections that may name a model or an FMU."""
+    for key in ("cable", "robot", "contact"):
+        if key in document:
+            yield (key,)
+    components = document.get("components")
+    for name in components if isinstance(components, dict) else ():
+        yield "components", name
+
+
+def _table(document: Document, place: tuple[str, ...]) -> Document | None:
+    table: Any = document
+    for key in place:
+        table = table.get(key) if isinstance(table, dict) else None
+    return table if isinstance(table, dict) else None
+
+
+def _is_another(below: Document, above: Document) -> bool:
+    given = [key for key in ("model", "fmu") if key in above]
+    return any(bare(above[key]) != bare(below.get(key)) for key in given)
+
+
+def _left_behind(place: tuple[str, ...], below: Document) -> Iterator[str]:
+    lost = [f"{group}.{name}" for group in ("parameters", "inputs") for name in below.get(group, {})]
+    was = bare(below.get("model")) or bare(below.get("fmu"))
+    if lost:
+        whose = f"{was}'s" if was else "those of our own module"
+        yield f"{'.'.join(place)}: {', '.join(lost)} are {whose} and not taken over for another"
+
+
+def _drop(document: Document, place: tuple[str, ...]) -> None:
+    *above, last = place
+    table = _table(document, tuple(above))
+    if table is not None:
+        del table[last]
+
+
+def _make_room_for_master(document: Document, master: Any) -> None:
+    simulation, options = (_table(document, (key,)) or {} for key in ("simulation", "master"))
+    if bare(simulation.get("master", DEFAULT_MASTER)) != master:
+        document["master"] = shared_options(options, master)
+        simulation.pop("exchange", None)
+
+
+def shared_options(options: Document, master: str) -> Document:
+    """Return those `options` of one master that are also for another: the tolerance."""
+    known = master_options().get(master, {})
+    return {key: value for key, value in options.items() if key == "tolerance" and key in known}
+
+
+# -- files -------------------------------------------------------------------------------------------------------
+
+
+def named_tables(document: Document) -> Document:
+    """Return a copy in which nested keys of `NAMED_TABLES` are one name: ``inertia.xx`` and not a table."""
+    copy: Document = {}
+    for key, value in document.items():
+        if not isinstance(value, dict):
+            copy[key] = value
+        elif key in NAMED_TABLES:
+            copy[key] = dict(_flat(value))
+        else:
+            copy[key] = named_tables(value)
+    return copy
+
+
+def _flat(table: Document, prefix: str = "") -> Iterator[tuple[str, Any]]:
+    for key, value in table.items():
+        if isinstance(value, dict) and "value" not in value:
+            yield from _flat(value, f"{prefix}{key}.")
+        else:
+            yield prefix + key, value
+
+
+def resolve_paths(document: Document, folder: Path) -> None:
+    """Make the paths of FMUs and of robots' files absolute; they are relative to the file in which they stand."""
+    for place in _sections(document):
+        section = _table(document, place) or {}
+        for key in ("fmu", "model"):
+            text = bare(section.get(key))
+            if isinstance(text, str) and (key == "fmu" or robot_spec.is_file(text)):
+                path = str((folder / text).absolute())
+                section[key] = section[key] | {"value": path} if is_quantity(section[key]) else path
+
+
+# -- options of a command ----------------------------------------------------------------------------------------
+
+
+def replace_robot(stack: Stack, robot: str) -> list[str]:
+    """Put another robot in place: a name of the catalogue, or the path of a robot's file or of an FMU."""
+    key = "fmu" if robot.endswith(".fmu") else "model"
+    section = {key: robot}
+    above = {"robot": section}
+    resolve_paths(above, Path())
+    return lay(stack, above, "--robot")
+
+
+def replace_master(stack: Stack, master: str) -> None:
+    """Put another master in place, with its own defaults, the tolerance excepted."""
+    lay(stack, {"simulation": {"master": master}}, "--master")
+
+
+def override(stack: Stack, texts: Iterable[str]) -> None:
+    """Write each ``key=value`` into the document."""
+    for text in texts:
+        path, equals, value = (part.strip() for part in text.partition("="))
+        if not (path and equals and value):
+            raise InputError(f"{SET} {text}: write key=value, for instance robot.parameters.mass=12")
+        *tables, last = _keys(path)
+        table = stack.document
+        for key in tables:
+            table = table.setdefault(key, {})
+            if not isinstance(table, dict):
+                raise InputError(f"{SET} {text}: {key} is a value and has no keys below it")
+        given = named_tables({last: _toml_value(value, text)})
+        table |= given
+        stack.note(SET, [path, *leaves(given, "".join(f"{key}." for key in tables))])
+
+
+def _keys(path: str) -> list[str]:
+    parts = path.split(".")
+    for i, part in enumerate(parts):
+        if part in NAMED_TABLES and i + 1 < len(parts):
+            return [*parts[: i + 1], ".".join(parts[i + 1 :])]
+    return parts
+
+
+def _toml_value(value: str, text: str) -> Any:
+    """Return a TOML value; a bare word is taken as a string, so that a shell's quotes can be left out."""
+    try:
+        return tomllib.loads(f"v = {value}")["v"]
+    except tomllib.TOMLDecodeError:
+        if re.fullmatch(r"[A-Za-z_./][\w./+-]*", value):
+            return value
+        raise InputError(f"{SET} {text}: {value} is not a TOML value; quote a string") from None

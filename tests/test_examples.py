@@ -1,0 +1,64 @@
+"""Every example runs as it stands, in an empty folder, and shows what it must."""
+
+from __future__ import annotations
+
+import runpy
+from pathlib import Path
+from typing import Any
+
+import numpy as np
+import pytest
+
+FOLDER = Path(__file__).resolve().parents[1] / "examples"
+
+
+@pytest.fixture
+def example(tmp_path: Path, monkeypatch: pytest.MonkeyPatch) -> Any:
+    """Run an example by name and return its variables."""
+    monkeypatch.chdir(tmp_path)
+    return lambda name: runpy.run_path(str(FOLDER / f"{name}.py"))
+
+
+def test_a_landing_swings_down_and_says_how_wrong_it_is(example: Any) -> None:
+    shown = example("landing")
+    run, z = shown["run"], shown["z"]
+    assert 0.3 < z[0] - z.values.min() < 0.5  # the flagship goes down by 0.4 m
+    assert run.summary["unconverged_steps"] == 0
+    for name, error in run.estimated_error.items():
+        assert 0.0 < error < 1e-3 * np.ptp(run.signals[name].values)
+
+
+def test_a_heavier_robot_goes_deeper_and_two_wheels_have_two_contacts(example: Any) -> None:
+    shown = example("swap_robot")
+    depth = shown["depth"]
+    assert depth["10 kg"] < depth["38 kg"] < depth["100 kg"]
+    assert "contact2.normal_force" in shown["runs"]["two wheels"].signals
+
+
+def test_the_own_line_has_the_sag_it_was_given(example: Any) -> None:
+    height = example("own_line")["height"]
+    assert -height[0] == pytest.approx(3.0, abs=1e-3)  # found to the mesh's accuracy, 1e-4 of the sag
+    assert height.values.min() < height[0]
+
+
+def test_results_are_the_same_from_disk(example: Any) -> None:
+    shown = example("read_results")
+    run, old = shown["run"], shown["old"]
+    assert set(old.signals) == set(run.signals)
+    for name in ("robot.body.position.z", "contact1.normal_force"):
+        np.testing.assert_array_equal(old.signals[name].values, run.signals[name].values)
+    assert shown["largest"] == shown["force"].values.max()
+    assert shown["touch"] == pytest.approx(np.sqrt(2 * 0.05 / 9.8), abs=0.01)  # a free fall of 5 cm, to two steps
+
+
+def test_the_implicit_master_is_of_order_4_and_the_explicit_one_of_order_1(example: Any) -> None:
+    orders = example("compare_masters")["comparison"].observed_order
+    assert orders["iqn_ils"]["left.position"] == pytest.approx(4.0, abs=0.2)
+    assert orders["gauss_seidel"]["left.position"] == pytest.approx(1.0, abs=0.2)
+
+
+def test_every_example_is_tested_and_listed() -> None:
+    names = {path.stem for path in FOLDER.glob("*.py")}
+    listed = (FOLDER / "README.md").read_text()
+    tested = Path(__file__).read_text() + Path(__file__).with_name("test_engine.py").read_text()
+    assert [n for n in names if f"({n}.py)" not in listed or f'"{n}"' not in tested] == []
