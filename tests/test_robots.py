@@ -4,7 +4,7 @@ import math
 
 import pytest
 
-from fmus.robot import Robot
+from fmus.robot.module import Robot
 from orchestrator.catalogue.robot_spec import FOLDER, catalogue, load_robot
 from orchestrator.coupling.errors import InputError
 

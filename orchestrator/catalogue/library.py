@@ -7,16 +7,13 @@ from __future__ import annotations
 
 import os
 from collections.abc import Callable, Iterable
-from importlib import import_module
 from pathlib import Path
 
 from fmus.kernels.cache import prune, used, user_folder
+from fmus.module import registry
 from fmus.module.recipe import FmuRecipe
 from orchestrator.catalogue.robot_spec import RobotSpec, catalogue
 from orchestrator.coupling.errors import InputError
-
-MODULES = ("cable", "contact", "oscillator")
-"""Our modules with one FMU each; robots have one for each entry of the catalogue."""
 
 
 def cable_fmu() -> Path:
@@ -30,8 +27,8 @@ def contact_fmu() -> Path:
 
 
 def module_fmu(name: str) -> Path:
-    """Return the FMU of one of `MODULES`, up to date."""
-    return _kept([module_recipe(name)])[0]
+    """Return the FMU of a module of the registry, up to date."""
+    return _kept([registry.find(name).recipe()])[0]
 
 
 def robot_fmu(robot: RobotSpec) -> Path:
@@ -39,23 +36,18 @@ def robot_fmu(robot: RobotSpec) -> Path:
     return _kept([robot_recipe(robot)])[0]
 
 
-def module_recipe(name: str) -> FmuRecipe:
-    """Return the recipe of one of `MODULES`."""
-    return import_module(f"fmus.{name}.{name}_fmu").RECIPE
-
-
 def robot_recipe(robot: RobotSpec) -> FmuRecipe:
     """Return the recipe of a robot."""
-    from fmus.robot.robot_fmu import robot_recipe
-
-    return robot_recipe(robot.fmu_name, robot.n_wheels, robot.parameters, robot.title)
+    wheels = {"n_wheels": robot.n_wheels}
+    return registry.find("robot").recipe(robot.fmu_name, robot.title, wheels, robot.parameters)
 
 
 def build_all(folder: Path | None) -> list[Path]:
-    """Build the FMUs of all modules and of every robot of the catalogue in `folder`, or where runs keep them."""
+    """Build the FMUs of our modules and of every robot of the catalogue in `folder`, or where runs keep them."""
     from fmus.face.build import ensure_fmus
 
-    recipes = (*map(module_recipe, MODULES), *map(robot_recipe, catalogue().values()))
+    ours = [registry.find(key).recipe() for key in registry.OURS if key != "robot"]  # robots: those of the catalogue
+    recipes = (*ours, *map(robot_recipe, catalogue().values()))
     return _kept(recipes) if folder is None else _within(folder, lambda: ensure_fmus(recipes, folder))
 
 
