@@ -27,60 +27,77 @@ N_SHAPE = 41
 """Points at which the shape of the cable is shown, equally spaced in unstretched arc length."""
 
 
-def _parameters() -> list[Variable]:
-    return [
-        parameter("span", "m", 200.0, "horizontal distance of the supports", POSITIVE),
-        parameter("level_difference", "m", 0.0, "height of the right support above the left one"),
-        parameter("unstretched_length", "m", 200.0, "unstretched length of the cable", POSITIVE),
-        parameter(
-            "sag",
-            "m",
-            0.0,
-            "sag at midspan wanted; 0: given by unstretched_length, else that is found from the sag",
-            NON_NEGATIVE,
-        ),
-        Variable(
-            "n_elements",
-            "parameter",
-            "1",
-            20,
-            "number of elements",
-            kind="integer",
-            bounds=Bounds(ge=1, le=5000),
-        ),
-        parameter(
-            "grading", "1", 1.0, "ratio of the longest to the shortest element; 1: equal elements", Bounds(ge=1.0)
-        ),
-        parameter(
-            "grading_position",
-            "m",
-            -1.0,
-            "arc length of a refined point besides the supports; negative: none",
-        ),
-        parameter("axial_stiffness", "N", 8.12e7, "EA", POSITIVE),
-        parameter("bending_stiffness", "N.m2", 6580.0, "EI", NON_NEGATIVE),
-        parameter("linear_density", "kg/m", 0.91, "mass per unstretched length", POSITIVE),
-        parameter("damping_time", "s", 0.005, "Kelvin-Voigt damping: ratio of viscosity to stiffness", NON_NEGATIVE),
-        parameter("gravity", "m/s2", 9.8, "acceleration of gravity, towards -z", NON_NEGATIVE),
-        Variable("clamped", "parameter", "1", False, "supports hold the transverse slope too", kind="boolean"),
-        parameter("integration_step", "s", 0.0025, "longest inner step", POSITIVE),
-        parameter(
-            "spectral_radius",
-            "1",
-            0.9,
-            "spectral radius of the time integration at infinite frequency, 0 to 1",
-            Bounds(ge=0.0, le=1.0),
-        ),
-        Variable(
-            "integrator",
-            "parameter",
-            "1",
-            "collocation",
-            "time integration: two-stage collocation (order 3, 4 at spectral radius 1) or generalized-alpha (order 2)",
-            kind="string",
-            choices=("collocation", "generalized_alpha"),
-        ),
-    ]
+_PARAMETERS = [
+    parameter("span", "m", 200.0, "horizontal distance of the supports", POSITIVE),
+    parameter("level_difference", "m", 0.0, "height of the right support above the left one"),
+    parameter("unstretched_length", "m", 200.0, "unstretched length of the cable", POSITIVE),
+    parameter(
+        "sag",
+        "m",
+        0.0,
+        "sag at midspan wanted; 0: given by unstretched_length, else that is found from the sag",
+        NON_NEGATIVE,
+    ),
+    Variable(
+        "n_elements",
+        "parameter",
+        "1",
+        20,
+        "number of elements",
+        kind="integer",
+        bounds=Bounds(ge=1, le=5000),
+    ),
+    parameter(
+        "grading", "1", 1.0, "ratio of the longest to the shortest element; 1: equal elements", Bounds(ge=1.0)
+    ),
+    parameter(
+        "grading_position",
+        "m",
+        -1.0,
+        "arc length of a refined point besides the supports; negative: none",
+    ),
+    parameter("axial_stiffness", "N", 8.12e7, "EA", POSITIVE),
+    parameter("bending_stiffness", "N.m2", 6580.0, "EI", NON_NEGATIVE),
+    parameter("linear_density", "kg/m", 0.91, "mass per unstretched length", POSITIVE),
+    parameter("damping_time", "s", 0.005, "Kelvin-Voigt damping: ratio of viscosity to stiffness", NON_NEGATIVE),
+    parameter("gravity", "m/s2", 9.8, "acceleration of gravity, towards -z", NON_NEGATIVE),
+    Variable("clamped", "parameter", "1", False, "supports hold the transverse slope too", kind="boolean"),
+    parameter("integration_step", "s", 0.0025, "longest inner step", POSITIVE),
+    parameter(
+        "spectral_radius",
+        "1",
+        0.9,
+        "spectral radius of the time integration at infinite frequency, 0 to 1",
+        Bounds(ge=0.0, le=1.0),
+    ),
+    Variable(
+        "integrator",
+        "parameter",
+        "1",
+        "collocation",
+        "time integration: two-stage collocation (order 3, 4 at spectral radius 1) or generalized-alpha (order 2)",
+        kind="string",
+        choices=("collocation", "generalized_alpha"),
+    ),
+]
+
+
+_OUTPUTS = (
+    ("tension_left", "N", "tension at the left support"),
+    ("tension_mid", "N", "tension at midspan"),
+    ("tension_right", "N", "tension at the right support"),
+    ("kinetic_energy", "J", "kinetic energy"),
+    ("strain_energy", "J", "elastic energy of stretching and bending"),
+    ("gravitational_energy", "J", "potential energy of gravity, zero at z = 0"),
+    ("dissipated_energy", "J", "energy dissipated by material damping"),
+    ("reaction_left.x", "N", "force of the left support on the cable, x"),
+    ("reaction_left.y", "N", "force of the left support on the cable, y"),
+    ("reaction_left.z", "N", "force of the left support on the cable, z"),
+    ("reaction_right.x", "N", "force of the right support on the cable, x"),
+    ("reaction_right.y", "N", "force of the right support on the cable, y"),
+    ("reaction_right.z", "N", "force of the right support on the cable, z"),
+)
+"""Name, unit and meaning of the outputs besides ports and shape, in the order of `diagnose`."""
 
 
 def _port(k: int) -> tuple[list[Variable], list[Variable]]:
@@ -108,27 +125,12 @@ def _port(k: int) -> tuple[list[Variable], list[Variable]]:
 
 def _table() -> VariableTable:
     rows_of = [_port(k + 1) for k in range(N_PORTS)]
-    rows = _parameters()
+    rows = list(_PARAMETERS)
     for inputs, _ in rows_of:
         rows += inputs
     for _, outputs in rows_of:
         rows += outputs
-    for name, unit, description in (
-        ("tension_left", "N", "tension at the left support"),
-        ("tension_mid", "N", "tension at midspan"),
-        ("tension_right", "N", "tension at the right support"),
-        ("kinetic_energy", "J", "kinetic energy"),
-        ("strain_energy", "J", "elastic energy of stretching and bending"),
-        ("gravitational_energy", "J", "potential energy of gravity, zero at z = 0"),
-        ("dissipated_energy", "J", "energy dissipated by material damping"),
-        ("reaction_left.x", "N", "force of the left support on the cable, x"),
-        ("reaction_left.y", "N", "force of the left support on the cable, y"),
-        ("reaction_left.z", "N", "force of the left support on the cable, z"),
-        ("reaction_right.x", "N", "force of the right support on the cable, x"),
-        ("reaction_right.y", "N", "force of the right support on the cable, y"),
-        ("reaction_right.z", "N", "force of the right support on the cable, z"),
-    ):
-        rows.append(Variable(name, "output", unit, 0.0, description))
+    rows += [Variable(name, "output", unit, 0.0, description) for name, unit, description in _OUTPUTS]
     for i in range(N_SHAPE):
         rows += vector(f"shape[{i + 1}].position", "output", "m", f"centreline at {i}/{N_SHAPE - 1} of its length")
         rows.append(Variable(f"shape[{i + 1}].tension", "output", "N", 0.0, "axial force there"))

@@ -27,58 +27,56 @@ SAMPLES = 8
 """Gauss points of a macro step, in time (see README)."""
 
 
-def _parameters() -> list[Variable]:
-    touch = Bounds(ge=1.0, hint="a smaller one makes the wall infinitely stiff at touch")
-    angle = Bounds(gt=0.0, lt=math.pi, hint="is it given in degrees?")
-
-    return [
-        parameter(
-            "stiffness",
-            "N/m^n",
-            1e8,
-            "stiffness k of one groove wall, force = k * penetration^n; n = exponent",
-            POSITIVE,
-        ),
-        parameter("exponent", "1", 2.5, "exponent n of the penetration", touch),
-        parameter("damping", "s/m", 1.0, "Hunt-Crossley damping D, factor 1 + D * penetration rate", NON_NEGATIVE),
-        parameter(
-            "friction_coefficient",
-            "1",
-            0.7,
-            "Coulomb friction coefficient on the sum of both walls' forces",
-            NON_NEGATIVE,
-        ),
-        parameter("wheel_radius", "m", 0.075, "radius of the wheel's rim", POSITIVE),
-        parameter("groove_angle", "rad", 1.7453292519943295, "full opening angle of the groove", angle),
-        parameter("groove_width", "m", 0.08, "width of the groove at the rim", POSITIVE),
-        parameter("cable_diameter", "m", 0.018, "diameter of the cable", POSITIVE),
-        parameter(
-            "max_contact_length", "m", 0.06, "longest contact length l0; stiffness / l0 acts per unit length", POSITIVE
-        ),
-        parameter("tangential_stiffness", "N/m", 1e6, "stiffness of the friction bristle before it slides", POSITIVE),
-        parameter(
-            "tangential_damping",
-            "N.s/m",
-            1e3,
-            "damping of the friction bristle before it slides",
-            NON_NEGATIVE,
-        ),
-        parameter(
-            "initial.s",
-            "m",
-            0.0,
-            "arc length of the contact point on the unstretched cable at the start",
-        ),
-        Variable(
-            "exchange",
-            "parameter",
-            "1",
-            "waveform",
-            "what the step assumes of the motion inside it",
-            kind="string",
-            choices=("point", "waveform", "hermite"),
-        ),
-    ]
+_TOUCH = Bounds(ge=1.0, hint="a smaller one makes the wall infinitely stiff at touch")
+_ANGLE = Bounds(gt=0.0, lt=math.pi, hint="is it given in degrees?")
+_PARAMETERS = [
+    parameter(
+        "stiffness",
+        "N/m^n",
+        1e8,
+        "stiffness k of one groove wall, force = k * penetration^n; n = exponent",
+        POSITIVE,
+    ),
+    parameter("exponent", "1", 2.5, "exponent n of the penetration", _TOUCH),
+    parameter("damping", "s/m", 1.0, "Hunt-Crossley damping D, factor 1 + D * penetration rate", NON_NEGATIVE),
+    parameter(
+        "friction_coefficient",
+        "1",
+        0.7,
+        "Coulomb friction coefficient on the sum of both walls' forces",
+        NON_NEGATIVE,
+    ),
+    parameter("wheel_radius", "m", 0.075, "radius of the wheel's rim", POSITIVE),
+    parameter("groove_angle", "rad", 1.7453292519943295, "full opening angle of the groove", _ANGLE),
+    parameter("groove_width", "m", 0.08, "width of the groove at the rim", POSITIVE),
+    parameter("cable_diameter", "m", 0.018, "diameter of the cable", POSITIVE),
+    parameter(
+        "max_contact_length", "m", 0.06, "longest contact length l0; stiffness / l0 acts per unit length", POSITIVE
+    ),
+    parameter("tangential_stiffness", "N/m", 1e6, "stiffness of the friction bristle before it slides", POSITIVE),
+    parameter(
+        "tangential_damping",
+        "N.s/m",
+        1e3,
+        "damping of the friction bristle before it slides",
+        NON_NEGATIVE,
+    ),
+    parameter(
+        "initial.s",
+        "m",
+        0.0,
+        "arc length of the contact point on the unstretched cable at the start",
+    ),
+    Variable(
+        "exchange",
+        "parameter",
+        "1",
+        "waveform",
+        "what the step assumes of the motion inside it",
+        kind="string",
+        choices=("point", "waveform", "hermite"),
+    ),
+]
 
 
 def _inputs() -> list[Variable]:
@@ -105,42 +103,32 @@ def _inputs() -> list[Variable]:
     ]
 
 
-def _outputs(motion: tuple[str, ...]) -> list[Variable]:
-    def wrench(body: str, about: str) -> list[Variable]:
-        return [
-            *vector(f"{body}.force", "output", "N", f"mean force on the {body}", feedthrough=motion),
-            *vector(
-                f"{body}.moment",
-                "output",
-                "N.m",
-                f"mean moment on the {body} about {about}",
-                feedthrough=motion,
-            ),
-            *vector(f"{body}.force_rate", "output", "N/s", f"slope of the force on the {body}"),
-            *vector(f"{body}.moment_rate", "output", "N.m/s", f"slope of the moment on the {body}"),
-        ]
+def _wrench(body: str, about: str, motion: tuple[str, ...]) -> list[Variable]:
+    """Return force and moment on one body, and their slopes."""
+    force, moment = f"mean force on the {body}", f"mean moment on the {body} about {about}"
+    return [
+        *vector(f"{body}.force", "output", "N", force, feedthrough=motion),
+        *vector(f"{body}.moment", "output", "N.m", moment, feedthrough=motion),
+        *vector(f"{body}.force_rate", "output", "N/s", f"slope of the force on the {body}"),
+        *vector(f"{body}.moment_rate", "output", "N.m/s", f"slope of the moment on the {body}"),
+    ]
 
+
+def _outputs(motion: tuple[str, ...]) -> list[Variable]:
     def real(name: str, unit: str, description: str, feedthrough: tuple[str, ...] = motion) -> Variable:
         return Variable(name, "output", unit, 0.0, description, feedthrough=feedthrough)
 
+    statuses = "0 open, 1 stick, 2 slip, 3 left the groove"
     return [
-        *wrench("cable", "cable.position"),
-        *wrench("wheel", "wheel.position"),
+        *_wrench("cable", "cable.position", motion),
+        *_wrench("wheel", "wheel.position", motion),
         Variable("cable.s", "output", "m", 0.0, "arc length of the contact point", discrete=True),
         real("normal_force", "N", "sum of the forces of both groove walls"),
         real("friction_force", "N", "magnitude of the friction force"),
         real("penetration", "m", "deepest penetration; negative: the gap"),
         real("slip_velocity", "m/s", "speed of the cable point relative to the wheel"),
         real("contact_length", "m", "length of the cable that touches the groove"),
-        Variable(
-            "status",
-            "output",
-            "1",
-            OPEN,
-            "0 open, 1 stick, 2 slip, 3 left the groove",
-            kind="integer",
-            feedthrough=motion,
-        ),
+        Variable("status", "output", "1", OPEN, statuses, kind="integer", feedthrough=motion),
         real("dissipated_energy", "J", "energy dissipated by walls and friction", ()),
         real("strain_energy", "J", "elastic energy of walls and friction bristle"),
         real("work_cable", "J", "work done on the cable, booked from what is exchanged", ()),
@@ -154,7 +142,7 @@ def _table() -> VariableTable:
     motion = names[: at.MOTION_SIZE]
     for first in (at.ROTATION, at.CURVATURE):
         motion += names[first : first + 3]
-    return VariableTable([*_parameters(), *inputs, *_outputs(motion)])
+    return VariableTable([*_PARAMETERS, *inputs, *_outputs(motion)])
 
 
 class Contact:

@@ -15,24 +15,30 @@ import hashlib
 import importlib.util
 import re
 import sys
+import threading
 from collections.abc import Callable, Iterator
 from functools import cache
 from pathlib import Path
+from types import ModuleType
 from typing import Any
 
+import llvmlite
 import numba
+import numpy as np
 
 from fmus.kernels import compilation
 from fmus.kernels.cache import prune, remove, used, user_folder
 
 if __name__ == "fmus.kernels.jit":  # not the copy within an FMU
     compilation.watch()
-LIBRARIES = {*sys.stdlib_module_names, "numba", "numpy", "scipy", "llvmlite"}
+LIBRARIES = {*sys.stdlib_module_names, "numba", "numpy", "scipy", "llvmlite"} - {"__main__"}
 """What is not looked into: their versions, not their sources, decide over the compiled code."""
+VERSIONS = f"{sys.version} {numba.__version__} {llvmlite.__version__} {np.__version__}"
 IMPORT = re.compile(
-    r"^[ \t]*(?:from[ \t]+([\w.]+)[ \t]+import[ \t]+(\([^)]*\)|[^\n#]*)|import[ \t]+([^\n#]+))", re.MULTILINE
+    r"^[ \t]*(?:from[ \t]+([\w.]+)[ \t]+import[ \t]+(\([^)]*\)|[^\n]*)|import[ \t]+([^\n]+))", re.MULTILINE
 )
 
+_decorating = threading.RLock()
 _folders: dict[str, Path] = {}
 
 
@@ -58,27 +64,32 @@ def summing_kernel(function: Callable) -> Callable:
 def _compiled(function: Callable, **options: Any) -> Callable:
     inner = function.__name__.startswith("_")
     options |= {"_nrt": False, "no_cfunc_wrapper": True, "no_cpython_wrapper": inner}
+    options |= {"error_model": "numpy"}
     with _cached_in(code_folder(function.__module__)):
-        return numba.njit(cache=True, error_model="numpy", **options)(function)
+        try:
+            return numba.njit(cache=True, **options)(function)
+        except RuntimeError:  # it has no file: typed at a prompt
+            return numba.njit(**options)(function)
 
 
 @contextlib.contextmanager
 def _cached_in(folder: Path) -> Iterator[None]:
-    """Let Numba keep what is decorated now in `folder`."""
-    before = numba.config.CACHE_DIR  # type: ignore[attr-defined]
-    numba.config.CACHE_DIR = str(folder)  # type: ignore[attr-defined]
-    try:
-        yield
-    finally:
-        numba.config.CACHE_DIR = before  # type: ignore[attr-defined]
+    """Let Numba keep what is decorated now in `folder`; one thread at a time, as its setting is that of the process."""
+    with _decorating:
+        before = numba.config.CACHE_DIR  # type: ignore[attr-defined]
+        numba.config.CACHE_DIR = str(folder)  # type: ignore[attr-defined]
+        try:
+            yield
+        finally:
+            numba.config.CACHE_DIR = before  # type: ignore[attr-defined]
 
 
 @cache
 def code_folder(module: str) -> Path:
     """Return the folder of compiled code of the kernels in `module`, which has been imported up to them."""
-    digest = hashlib.sha256(f"{numba.__version__} {sys.version}".encode())
+    digest = hashlib.sha256(VERSIONS.encode())
     for name, content in sorted(sources(module).items()):
-        digest.update(name.encode() + b"\0" + content)
+        digest.update(f"\0{name}\0{len(content)}\0".encode() + content)
     parent = user_folder("kernels")
     folder = parent / f"{module}-{digest.hexdigest()[:16]}"
     if not folder.is_dir():  # Numba makes it when there is something to keep
@@ -102,44 +113,82 @@ def _remove_former(parent: Path) -> None:
 
 
 def sources(module: str) -> dict[str, bytes]:
-    """Return the content of the source of `module` and of all that it imports, by name; libraries are left out."""
+    """Return the source of `module` and of all that it takes names from, by name of the module; libraries are left out.
+
+    Import statements are followed wherever they stand in a file; a module that is found by other means is not.
+    """
     found: dict[str, bytes] = {}
     left = [module]
     while left:
         name = left.pop()
         path = _file(name)
         if name not in found and path is not None:
-            found[name] = path.read_bytes()
-            left += _imported(found[name].decode(errors="replace"), name)
+            found[name] = _content(path)
+            left += _imported(found[name].decode(errors="replace"), name, path)
     return found
 
 
-def _imported(source: str, module: str) -> Iterator[str]:
-    """Yield the names that the import statements of `source` may mean; those that are no modules have no file."""
-    for base, names, plain in IMPORT.findall(source):
-        for name in plain.split(","):
-            yield name.split(" as ")[0].strip()
+@cache
+def _content(path: Path) -> bytes:
+    return path.read_bytes()
+
+
+def _imported(source: str, module: str, path: Path) -> Iterator[str]:
+    """Yield the modules that the import statements of `source`, the text of `module`, take something from."""
+    plain_text = re.sub(r"#[^\n]*|\\\n", "", source).replace(";", "\n")
+    for base, names, plain in IMPORT.findall(plain_text):
+        for name in _listed(plain):
+            parts = name.split(".")
+            yield from (".".join(parts[: i + 1]) for i in range(len(parts)))  # the parents are at hand, too
         if base:
-            base = _absolute(base, module)
-            yield base
-            for name in names.strip("() \n").split(","):
-                yield f"{base}.{name.split(' as ')[0].strip()}"
+            base = _absolute(base, module, path)
+            yield from (_origin(base, name) for name in _listed(names))
 
 
-def _absolute(base: str, module: str) -> str:
+def _listed(names: str) -> list[str]:
+    """Return the names in ``a, b as c``, with or without brackets around it."""
+    return [name.split(" as ")[0].strip() for name in names.strip("() \n\t").split(",") if name.strip()]
+
+
+def _origin(base: str, name: str) -> str:
+    """Return where ``from base import name`` takes the name from: the module of that name in `base`, or `base`."""
+    at_hand = getattr(sys.modules.get(base), name, None)
+    is_module = at_hand is None or isinstance(at_hand, ModuleType)
+    return f"{base}.{name}" if is_module and _file(f"{base}.{name}") else base
+
+
+def _absolute(base: str, module: str, path: Path) -> str:
     """Return the absolute name of what ``from base import`` means in `module`."""
     dots = len(base) - len(base.lstrip("."))
-    is_package = hasattr(sys.modules.get(module), "__path__")
-    parts = module.split(".")
-    return ".".join([*parts[: len(parts) - dots + is_package], base[dots:]]).strip(".") if dots else base
+    if not dots:
+        return base
+    package = getattr(sys.modules.get(module), "__package__", None)
+    if package is None:
+        package = module if path.stem == "__init__" else module.rpartition(".")[0]
+    parts = package.split(".")
+    return ".".join([*parts[: len(parts) - dots + 1], base[dots:]]).strip(".")
 
 
+@cache
 def _file(name: str) -> Path | None:
-    if not name or name.split(".")[0] in LIBRARIES - {"__main__"}:
+    """Return the source of the module `name`, imported or not; None if it is a library or no module at all."""
+    if not name or name.split(".")[0] in LIBRARIES:
         return None
-    module = sys.modules.get(name)
-    if module is None and name.rpartition(".")[0] in ("", *sys.modules):
-        with contextlib.suppress(ImportError, ValueError, AttributeError):
-            module = importlib.util.find_spec(name)  # imported further down, or not a module at all
-    place = getattr(module, "__file__", None) or getattr(module, "origin", None)
-    return Path(place) if place and place.endswith(".py") and Path(place).is_file() else None
+    place = getattr(sys.modules.get(name), "__file__", None)
+    path = Path(place) if place else _beside(name)
+    return path if path is not None and path.suffix == ".py" and path.is_file() else None
+
+
+def _beside(name: str) -> Path | None:
+    """Return where a module that is not imported would be imported from, without importing its parents."""
+    parent, _, last = name.rpartition(".")
+    if not parent:
+        with contextlib.suppress(ImportError, ValueError):
+            spec = importlib.util.find_spec(name)
+            return Path(spec.origin) if spec and spec.origin else None
+        return None
+    init = _file(parent)
+    folders = getattr(sys.modules.get(parent), "__path__", [init.parent] if init and init.stem == "__init__" else [])
+    candidates = [Path(folder, last) for folder in folders]
+    files = [file for path in candidates for file in (path / "__init__.py", path.with_name(f"{last}.py"))]
+    return next((file for file in files if file.is_file()), None)

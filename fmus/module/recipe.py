@@ -22,9 +22,17 @@ class Module(Protocol):
     values: np.ndarray
     state: np.ndarray
 
-    def initialize(self, t: float) -> None: ...
-    def refresh(self) -> None: ...
-    def step(self, t: float, h: float) -> None: ...
+    def initialize(self, t: float) -> None:
+        """From parameters and inputs to state and outputs at `t`; raises `ModuleError`."""
+        ...
+
+    def refresh(self) -> None:
+        """Write the outputs that inputs and state have at a fixed time."""
+        ...
+
+    def step(self, t: float, h: float) -> None:
+        """Advance from `t` to `t + h` and write the outputs; a `ModuleError` changes nothing that counts."""
+        ...
 
 
 @dataclass(frozen=True)

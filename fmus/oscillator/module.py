@@ -45,43 +45,42 @@ def advance(z, term, mass, stiffness, damping, coupling, coupling_damping, h):
                 z[i] += term[i]
 
 
-def _variables() -> list[Variable]:
-    neighbour = ("neighbour.position", "neighbour.velocity")
-    return [
-        parameter("mass", "kg", 1.0, "mass m", POSITIVE),
-        parameter("stiffness", "N/m", 1.0, "spring to the ground k", NON_NEGATIVE),
-        parameter("damping", "N.s/m", 0.0, "damper to the ground d", NON_NEGATIVE),
-        parameter("coupling_stiffness", "N/m", 0.0, "spring to the neighbour k_c", NON_NEGATIVE),
-        parameter("coupling_damping", "N.s/m", 0.0, "damper to the neighbour d_c", NON_NEGATIVE),
-        parameter("initial_position", "m", 0.0, "position at the start"),
-        parameter("initial_velocity", "m/s", 0.0, "velocity at the start"),
-        Variable(
-            "exchange",
-            "parameter",
-            "1",
-            "held",
-            "what the step assumes of the neighbour's motion inside it",
-            kind="string",
-            choices=("held", "waveform"),
-        ),
-        Variable("force", "input", "N", 0.0, "force on the mass, mean over the macro step"),
-        Variable("force_rate", "input", "N/s", 0.0, "slope of the force within the macro step"),
-        Variable("neighbour.position", "input", "m", 0.0, "position of the neighbour"),
-        Variable("neighbour.velocity", "input", "m/s", 0.0, "velocity of the neighbour"),
-        Variable("neighbour.position_mean", "input", "m", 0.0, "its time mean over the macro step, for waveform"),
-        Variable("position", "output", "m", 0.0, "position of the mass"),
-        Variable("position_mean", "output", "m", 0.0, "its time mean over the last macro step"),
-        Variable("velocity", "output", "m/s", 0.0, "velocity of the mass"),
-        Variable(
-            "neighbour.force",
-            "output",
-            "N",
-            0.0,
-            "force on the neighbour, its mean with waveform",
-            feedthrough=neighbour,
-        ),
-        Variable("neighbour.force_rate", "output", "N/s", 0.0, "its slope within the last macro step, for waveform"),
-    ]
+_NEIGHBOUR = ("neighbour.position", "neighbour.velocity")
+_VARIABLES = [
+    parameter("mass", "kg", 1.0, "mass m", POSITIVE),
+    parameter("stiffness", "N/m", 1.0, "spring to the ground k", NON_NEGATIVE),
+    parameter("damping", "N.s/m", 0.0, "damper to the ground d", NON_NEGATIVE),
+    parameter("coupling_stiffness", "N/m", 0.0, "spring to the neighbour k_c", NON_NEGATIVE),
+    parameter("coupling_damping", "N.s/m", 0.0, "damper to the neighbour d_c", NON_NEGATIVE),
+    parameter("initial_position", "m", 0.0, "position at the start"),
+    parameter("initial_velocity", "m/s", 0.0, "velocity at the start"),
+    Variable(
+        "exchange",
+        "parameter",
+        "1",
+        "held",
+        "what the step assumes of the neighbour's motion inside it",
+        kind="string",
+        choices=("held", "waveform"),
+    ),
+    Variable("force", "input", "N", 0.0, "force on the mass, mean over the macro step"),
+    Variable("force_rate", "input", "N/s", 0.0, "slope of the force within the macro step"),
+    Variable("neighbour.position", "input", "m", 0.0, "position of the neighbour"),
+    Variable("neighbour.velocity", "input", "m/s", 0.0, "velocity of the neighbour"),
+    Variable("neighbour.position_mean", "input", "m", 0.0, "its time mean over the macro step, for waveform"),
+    Variable("position", "output", "m", 0.0, "position of the mass"),
+    Variable("position_mean", "output", "m", 0.0, "its time mean over the last macro step"),
+    Variable("velocity", "output", "m/s", 0.0, "velocity of the mass"),
+    Variable(
+        "neighbour.force",
+        "output",
+        "N",
+        0.0,
+        "force on the neighbour, its mean with waveform",
+        feedthrough=_NEIGHBOUR,
+    ),
+    Variable("neighbour.force_rate", "output", "N/s", 0.0, "its slope within the last macro step, for waveform"),
+]
 
 
 class Oscillator:
@@ -89,7 +88,7 @@ class Oscillator:
 
     NAME = "oscillator"
     TITLE = "Mass between springs"
-    table = VariableTable(_variables())
+    table = VariableTable(_VARIABLES)
 
     def __init__(self) -> None:
         self.values = self.table.defaults()

@@ -24,41 +24,36 @@ ROUND_OFF = 1e-9
 """Relative; a macro step longer than a whole number of inner steps by less than this needs no further one."""
 
 
-def _body_parameters(n_wheels: int) -> list[Variable]:
-    tensor = "of the inertia tensor (minus the product of inertia)"
-    return [
-        Variable(
-            "n_wheels",
-            "parameter",
-            "1",
-            n_wheels,
-            "number of wheels; fixed by the model",
-            kind="integer",
-            bounds=Bounds(ge=1, le=rigid_body.MAX_WHEELS),
-        ),
-        parameter("mass", "kg", 38.0, "mass, wheels included", POSITIVE),
-        parameter(
-            "inertia.xx",
-            "kg.m2",
-            5.42,
-            "moment of inertia about the centre of mass, wheels included as if fixed",
-            POSITIVE,
-        ),
-        parameter("inertia.yy", "kg.m2", 5.42, "moment of inertia about the centre of mass", POSITIVE),
-        parameter("inertia.zz", "kg.m2", 8.5, "moment of inertia about the centre of mass", POSITIVE),
-        parameter("inertia.xy", "kg.m2", 0.0, f"entry xy {tensor}"),
-        parameter("inertia.xz", "kg.m2", 0.0, f"entry xz {tensor}"),
-        parameter("inertia.yz", "kg.m2", 0.0, f"entry yz {tensor}"),
-        parameter("gravity", "m/s2", 9.8, "gravitational acceleration, along -Z", NON_NEGATIVE),
-        parameter("integration_step", "s", 1e-3, "longest inner step", POSITIVE),
-        parameter("initial.roll", "rad", 0.0, "initial angle about x"),
-        parameter("initial.pitch", "rad", 0.0, "initial angle about y"),
-        parameter("initial.yaw", "rad", 0.0, "initial angle about z"),
-        *vector("center_of_mass", "parameter", "m", "centre of mass from b, in B", (0.0, 0.0, -0.1)),
-        *vector("initial.position", "parameter", "m", "initial position of b"),
-        *vector("initial.velocity", "parameter", "m/s", "initial velocity of b"),
-        *vector("initial.angular_velocity", "parameter", "rad/s", "initial angular velocity, inertial"),
-    ]
+_ENTRY = "of the inertia tensor (minus the product of inertia)"
+_BODY = [
+    parameter("mass", "kg", 38.0, "mass, wheels included", POSITIVE),
+    parameter(
+        "inertia.xx",
+        "kg.m2",
+        5.42,
+        "moment of inertia about the centre of mass, wheels included as if fixed",
+        POSITIVE,
+    ),
+    parameter("inertia.yy", "kg.m2", 5.42, "moment of inertia about the centre of mass", POSITIVE),
+    parameter("inertia.zz", "kg.m2", 8.5, "moment of inertia about the centre of mass", POSITIVE),
+    parameter("inertia.xy", "kg.m2", 0.0, f"entry xy {_ENTRY}"),
+    parameter("inertia.xz", "kg.m2", 0.0, f"entry xz {_ENTRY}"),
+    parameter("inertia.yz", "kg.m2", 0.0, f"entry yz {_ENTRY}"),
+    parameter("gravity", "m/s2", 9.8, "gravitational acceleration, along -Z", NON_NEGATIVE),
+    parameter("integration_step", "s", 1e-3, "longest inner step", POSITIVE),
+    parameter("initial.roll", "rad", 0.0, "initial angle about x"),
+    parameter("initial.pitch", "rad", 0.0, "initial angle about y"),
+    parameter("initial.yaw", "rad", 0.0, "initial angle about z"),
+    *vector("center_of_mass", "parameter", "m", "centre of mass from b, in B", (0.0, 0.0, -0.1)),
+    *vector("initial.position", "parameter", "m", "initial position of b"),
+    *vector("initial.velocity", "parameter", "m/s", "initial velocity of b"),
+    *vector("initial.angular_velocity", "parameter", "rad/s", "initial angular velocity, inertial"),
+]
+
+
+def _number_of_wheels(n_wheels: int) -> Variable:
+    text, bounds = "number of wheels; fixed by the model", Bounds(ge=1, le=rigid_body.MAX_WHEELS)
+    return Variable("n_wheels", "parameter", "1", n_wheels, text, kind="integer", bounds=bounds)
 
 
 def _wheel_parameters(wheel: str) -> list[Variable]:
@@ -121,7 +116,8 @@ def robot_table(n_wheels: int) -> VariableTable:
     wheels = [f"wheel[{k}]" for k in range(1, n_wheels + 1)]
     return VariableTable(
         [
-            *_body_parameters(n_wheels),
+            _number_of_wheels(n_wheels),
+            *_BODY,
             *(v for wheel in wheels for v in _wheel_parameters(wheel)),
             Variable("thrust", "input", "N", 0.0, "thrust along z_B, acting at b"),
             *vector("torque", "input", "N.m", "control torque, components in B"),
@@ -173,6 +169,21 @@ def _spin_inertia(values: np.ndarray, table: VariableTable, wheel: str) -> float
     return value
 
 
+def _without_spin(tensor: np.ndarray, wheels: np.ndarray) -> np.ndarray:
+    """Return the tensor (3, 3) less the spin inertia of the free among the `wheels` (n, 8): what a body's torque turns."""
+    rb = rigid_body
+    rest = tensor.copy()
+    for row in wheels:
+        axle = row[rb.AXLE : rb.AXLE + 3]
+        rest -= row[rb.FREE] * row[rb.SPIN_INERTIA] * np.outer(axle, axle)
+    if np.linalg.eigvalsh(rest)[0] <= 0.0:
+        raise ModuleError(
+            "wheel inertia: the free wheels' spin inertia exceeds the whole robot's; "
+            "lower wheel[k].inertia, or raise inertia, which includes the wheels"
+        )
+    return rest
+
+
 def body_parameters(values: np.ndarray, table: VariableTable) -> np.ndarray:
     """Return the parameters `prm` of the kernels, checked: (56,) float64.
 
@@ -186,25 +197,16 @@ def body_parameters(values: np.ndarray, table: VariableTable) -> np.ndarray:
     n_wheels = int(table["n_wheels"].start)
     if values[table.index["n_wheels"]] != n_wheels:
         raise ModuleError(f"n_wheels: this model has {n_wheels}; take a model of a robot with the wheels wanted")
+    tensor = inertia_tensor(values, table)
+    wheels = np.array([_wheel_row(values, table, f"wheel[{k + 1}]") for k in range(n_wheels)])
     prm = np.zeros(rb.N_PARAMETERS)
     prm[rb.MASS] = values[table.index["mass"]]
     prm[rb.GRAVITY] = values[table.index["gravity"]]
     prm[rb.N_WHEELS] = n_wheels
     prm[rb.B_FROM_G : rb.B_FROM_G + 3] = -_vector(values, table, "center_of_mass")
-    tensor = inertia_tensor(values, table)
-    without_spin = tensor.copy()
-    for k in range(n_wheels):
-        row = _wheel_row(values, table, f"wheel[{k + 1}]")
-        axle = row[rb.AXLE : rb.AXLE + 3]
-        without_spin -= row[rb.FREE] * row[rb.SPIN_INERTIA] * np.outer(axle, axle)
-        prm[rb.WHEELS + k * rb.WHEEL_STRIDE : rb.WHEELS + (k + 1) * rb.WHEEL_STRIDE] = row
-    if np.linalg.eigvalsh(without_spin)[0] <= 0.0:
-        raise ModuleError(
-            "wheel inertia: the free wheels' spin inertia exceeds the whole robot's; "
-            "lower wheel[k].inertia, or raise inertia, which includes the wheels"
-        )
     prm[rb.INERTIA : rb.INERTIA + 9] = tensor.ravel()
-    prm[rb.COMPLIANCE : rb.COMPLIANCE + 9] = np.linalg.inv(without_spin).ravel()
+    prm[rb.COMPLIANCE : rb.COMPLIANCE + 9] = np.linalg.inv(_without_spin(tensor, wheels)).ravel()
+    prm[rb.WHEELS : rb.WHEELS + wheels.size] = wheels.ravel()
     return prm
 
 
