@@ -50,7 +50,7 @@ def landing_run(tmp_path_factory) -> tuple[subprocess.CompletedProcess[str], Pat
 
 
 def test_help_imports_nothing_heavy():
-    code = "import sys, orchestrator.cli; print(*sys.modules)"
+    code = "import sys, orchestrator.cli.commands; print(*sys.modules)"
     done = subprocess.run([sys.executable, "-c", code], cwd=ROOT, capture_output=True, text=True, check=True)
     assert not {"numpy", "numba", "matplotlib", "fmpy", "pydantic"} & set(done.stdout.split())
 

@@ -6,6 +6,7 @@ Expected values: conservation of energy (test FMUs are exact inside a step), the
 from __future__ import annotations
 
 import signal
+from functools import cache
 
 import numpy as np
 import pytest
@@ -16,11 +17,12 @@ from orchestrator.coupling.graph.graph import Graph
 from orchestrator.coupling.graph.links import Connection
 from orchestrator.coupling.run.log import Log
 from orchestrator.coupling.stepping.step_control import SAFETY, StepControl
+from orchestrator.landing.resolve import Landing, resolve
 from orchestrator.runs import estimate
-from orchestrator.runs.coupled import run_coupled
+from orchestrator.runs.coupled import Coupled, run_coupled
 from orchestrator.runs.estimate import estimate_error
-from orchestrator.runs.files import summary
-from orchestrator.runs.record import Coupled
+from orchestrator.runs.summary import summary
+from orchestrator.runs.systems import LandingSystem
 from orchestrator.scenario.read import load
 from orchestrator.scenario.types import LandingScenario, Scenario
 from tests.fmus import fmu
@@ -147,36 +149,52 @@ def test_estimate_of_the_oscillator_is_within_a_factor_three(kind, master, H):
     assert summary(coupled)["estimated_error"] == coupled.estimated_error
 
 
-def landing(*settings: str) -> Scenario:
-    return load(LANDING, ["simulation.stop_time=0.055", *settings])
+def landing(*settings: str, stop: float = 0.055) -> LandingSystem:
+    return resolved(load(LANDING, [f"simulation.stop_time={stop}", *settings]))
+
+
+@cache
+def flagship() -> Landing:
+    scenario = load(LANDING)
+    assert isinstance(scenario, LandingScenario)
+    return resolve(scenario)
+
+
+def resolved(scenario: Scenario) -> LandingSystem:
+    """The landing of a scenario that starts as the flagship does."""
+    assert isinstance(scenario, LandingScenario)
+    return LandingSystem(flagship().changed(scenario))
 
 
 @pytest.mark.parametrize(("kind", "ratio", "stop"), [("finer", 0.5, 0.055), ("coarser", 2.0, 0.05)])
 def test_steps_and_tolerances_change_together(kind, ratio, stop):
     """Eleven macro steps: one is left over where they are doubled. The robot's inner step is its table's default."""
-    scenario = landing(f"simulation.estimate={kind}", "master.local_tolerance=1e-6")
-    other = estimate.second(scenario)
-    assert isinstance(other, LandingScenario)
+    system = landing(f"simulation.estimate={kind}", "master.local_tolerance=1e-6")
+    again = estimate.second(system)
+    assert isinstance(again, LandingSystem)
+    other = again.scenario
     assert other.simulation.macro_step == 0.005 * ratio and other.simulation.stop_time == pytest.approx(stop)
-    assert "integration_step" not in other.cable.parameters  # it follows the macro step
-    assert other.robot.parameters["integration_step"] == 0.001 * ratio
+    assert "integration_step" not in again.landing.cable.settings  # it follows the macro step
+    assert (
+        again.landing.robot.settings["integration_step"] == other.robot.parameters["integration_step"] == 0.001 * ratio
+    )
     changes = {name: change if ratio > 1 else 1 / change for name, change in estimate.TOLERANCES.items()}
     before = {"tolerance": 1e-6, "local_tolerance": 1e-6}
     assert other.master == {name: pytest.approx(before[name] * change) for name, change in changes.items()}
-    assert isinstance(scenario, LandingScenario) and "integration_step" not in scenario.robot.parameters
+    assert "integration_step" not in system.scenario.robot.parameters
 
 
 def test_an_inner_step_of_the_scenario_is_halved():
-    other = estimate.second(landing("cable.parameters.integration_step=0.002"))
-    assert isinstance(other, LandingScenario) and other.cable.parameters["integration_step"] == 0.001
+    again = estimate.second(landing("cable.parameters.integration_step=0.002"))
+    assert isinstance(again, LandingSystem) and again.landing.cable.settings["integration_step"] == 0.001
 
 
 @pytest.mark.parametrize(
     ("stop", "kind", "made"), [(0.01, "coarser", False), (0.02, "coarser", True), (0.005, "finer", True)]
 )
 def test_macro_steps_needed(stop, kind, made):
-    scenario = landing(f"simulation.estimate={kind}").changed(stop_time=stop)
-    assert (estimate.second(scenario) is not None) == made
+    system = landing(f"simulation.estimate={kind}", stop=stop)
+    assert (estimate.second(system) is not None) == made
 
 
 @pytest.mark.parametrize(
@@ -192,8 +210,8 @@ def test_macro_steps_needed(stop, kind, made):
 )
 def test_factor_by_hand(kind, master, exchange, expected):
     """From d = e(H) - e(H/2), and d = e(2H) - e(H), with e ~ H^p and p = 3, 2, 1."""
-    scenario = landing(f"simulation.estimate={kind}", f"simulation.master={master}", "master={}")
-    assert estimate.factor(scenario, exchange) == pytest.approx(expected)
+    system = landing(f"simulation.estimate={kind}", f"simulation.master={master}", "master={}")
+    assert estimate.factor(system.scenario, exchange) == pytest.approx(expected)
 
 
 def finished() -> Coupled:

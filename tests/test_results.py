@@ -1,6 +1,9 @@
 """Run directories, and the arithmetic of the comparison."""
 
 import json
+import subprocess
+import sys
+import time
 from pathlib import Path
 
 import numpy as np
@@ -11,15 +14,9 @@ from hypothesis import strategies as st
 
 from orchestrator.coupling.errors import InputError
 from orchestrator.coupling.run.compare import communication_times, matching_rows, observed_order, signal_errors
-from orchestrator.coupling.run.results import (
-    RunDirectory,
-    default_directory,
-    read_fields,
-    read_json,
-    read_table,
-    replacing,
-)
-from orchestrator.runs.compare import Comparison, Reference, Run
+from orchestrator.coupling.run.results import read_fields, read_json, read_table, replacing
+from orchestrator.runs.compare import Comparison, Reference, RunErrors
+from orchestrator.runs.directory import RunDirectory, claimed
 from orchestrator.runs.reference import common_divisor
 
 
@@ -99,9 +96,41 @@ def test_manifest(directory: RunDirectory, error: str | None, complete: bool):
 
 
 def test_default_directories_are_counted(tmp_path: Path):
-    assert default_directory("a", tmp_path).name == "a-001"
-    (tmp_path / "a-001").mkdir()
-    assert default_directory("a", tmp_path).name == "a-002"
+    assert RunDirectory.numbered("a", tmp_path).path.name == "a-001"
+    assert RunDirectory.numbered("a", tmp_path).path == tmp_path / "a-002"
+    assert (tmp_path / "a-002").is_dir()  # it is made at once, so that no other run takes it
+
+
+CLAIM = """
+import sys, time
+from pathlib import Path
+from orchestrator.runs.directory import RunDirectory
+while time.time() < float(sys.argv[2]):
+    pass
+for _ in range(5):
+    print(RunDirectory.numbered("a", Path(sys.argv[1])).path.name)
+"""
+
+
+def test_runs_that_start_at_the_same_moment_get_a_folder_each(tmp_path: Path):
+    """Four processes claim five folders each, all from the same instant on: twenty folders, numbered 1 to 20."""
+    command = [sys.executable, "-c", CLAIM, str(tmp_path), str(time.time() + 5.0)]
+    processes = [subprocess.Popen(command, stdout=subprocess.PIPE, text=True) for _ in range(4)]
+    names = [name for process in processes for name in process.communicate()[0].split()]
+    assert sorted(names) == [f"a-{number:03d}" for number in range(1, 21)]
+
+
+def test_a_run_that_fails_at_its_start_leaves_no_folder(tmp_path: Path):
+    with pytest.raises(RuntimeError), claimed(tmp_path / "out", "a"):
+        raise RuntimeError
+    assert list(tmp_path.iterdir()) == []
+
+
+def test_a_run_that_has_written_keeps_its_folder(tmp_path: Path):
+    with pytest.raises(RuntimeError), claimed(tmp_path / "out", "a") as directory:
+        directory.write_json("summary.json", {})
+        raise RuntimeError
+    assert (tmp_path / "out" / "summary.json").is_file()
 
 
 def test_unreadable_results_are_named(tmp_path: Path):
@@ -168,7 +197,9 @@ def comparison(error: float, estimate: float | None) -> Comparison:
     time = np.linspace(0.0, 1.0, 3)
     reference = Reference("monolithic", {"time": time, "z": time}, 1.0, {} if estimate is None else {"z": estimate})
     runs = [
-        Run("m", h, 2, 1.0, 0, 2, 1.0, signal_errors({"time": time, "z": time + error * h / 0.1}, reference.table))
+        RunErrors(
+            "m", h, 2, 1.0, 0, 2, 1.0, signal_errors({"time": time, "z": time + error * h / 0.1}, reference.table)
+        )
         for h in (0.1, 0.2)
     ]
     return Comparison(reference, runs, {"z": 1e-2})

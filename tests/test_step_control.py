@@ -14,6 +14,7 @@ from orchestrator.coupling.stepping.step_control import joined
 from orchestrator.runs.compare import held_against
 from orchestrator.runs.coupled import run_coupled
 from orchestrator.runs.reference import solve_reference
+from orchestrator.runs.summary import result
 from orchestrator.scenario.read import load
 from tests.fmus import MILD, oscillator, oscillator_solution
 from tests.scenarios import DROP
@@ -78,8 +79,8 @@ def test_hard_impact_takes_fewer_solves_than_fixed_steps():
     The roll of both is what the impact leaves in the first tenth of a second.
     """
     reference = solve_reference(drop(0.02), [0.00125])
-    fixed = held_against(run_coupled(drop(0.00125)), reference)
-    adaptive = held_against(run_coupled(drop(0.02, "master.local_tolerance=1e-6")), reference)
+    fixed = held_against(result(run_coupled(drop(0.00125))), reference)
+    adaptive = held_against(result(run_coupled(drop(0.02, "master.local_tolerance=1e-6"))), reference)
     z, roll = "robot.body.position.z", "robot.roll"
     assert adaptive.unconverged_steps == 0
     assert adaptive.cable_steps < fixed.cable_steps

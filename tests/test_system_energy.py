@@ -12,7 +12,7 @@ from orchestrator.landing.monolithic import solve
 from orchestrator.landing.monolithic.solve import integrate
 from orchestrator.runs.components import opened
 from orchestrator.runs.coupled import run_coupled
-from orchestrator.runs.files import summary
+from orchestrator.runs.summary import summary
 from tests.scenarios import scenario
 
 

@@ -8,33 +8,25 @@ from __future__ import annotations
 
 import os
 import sys
-from collections.abc import Callable
 from pathlib import Path
-from typing import TYPE_CHECKING, Annotated, Any
+from typing import Annotated, Any
 
 import typer
 from typer.core import TyperGroup
 
-from orchestrator.coupling.errors import DONE, FAILED, INTERRUPTED, MISSED, InputError, OrchestratorError, RunError
-from orchestrator.runs.compare import compared
-from orchestrator.runs.coupled import run_coupled
-from orchestrator.runs.estimate import estimate_error
-from orchestrator.runs.files import write, write_comparison, write_runs
-from orchestrator.runs.reference import solve_reference
-
-if TYPE_CHECKING:
-    from orchestrator.scenario.types import Scenario
+import orchestrator
 from orchestrator.cli import new
 from orchestrator.cli.printing import (
     complain,
-    complain_once,
+    complain_of,
     markup,
     print_comparison,
     print_run,
     print_table,
     progress_bars,
-    status,
+    show_notices,
 )
+from orchestrator.coupling.errors import DONE, FAILED, INTERRUPTED, MISSED, InputError, OrchestratorError
 
 
 class Commands(TyperGroup):
@@ -42,6 +34,7 @@ class Commands(TyperGroup):
 
     def invoke(self, ctx: Any) -> Any:
         """Carry out one command."""
+        show_notices()
         try:
             return super().invoke(ctx)
         except OrchestratorError as error:
@@ -122,9 +115,10 @@ def list_() -> None:
 @app.command()
 def validate(scenario: ScenarioFile, robot: Robot = None, set_: Set = None) -> None:
     """Parse, load, check connections, units and contract; nothing is run."""
-    loaded = _load(scenario, robot, set_)
+    from orchestrator.api import load_scenario
     from orchestrator.runs.components import master_of, opened
 
+    loaded = load_scenario(scenario, set=set_, robot=robot)
     with opened(loaded) as graph:
         master_of(loaded, graph)
         print(f"{scenario}: valid; {len(graph.components)} FMUs, {len(list(graph.connections))} connections")
@@ -166,19 +160,22 @@ def run(
     quiet: Quiet = False,
 ) -> None:
     """Run a scenario coupled."""
-    from orchestrator.coupling.run.results import RunDirectory
-
-    loaded = _load(scenario, robot, set_, master, macro_step, stop, timeout)
-    path = _free(out, loaded.name)
-    with progress_bars(quiet) as show:
-        coupled = run_coupled(loaded, show(_task(loaded), loaded.simulation.stop_time))
-        if loaded.simulation.estimate != "none":
-            words = f"error estimate, {loaded.simulation.estimate} run"
-            estimate_error(coupled, show(words, loaded.simulation.stop_time))
-    write(RunDirectory(path), coupled)
-    print_run(coupled)
-    print(f"results in {path}")
-    raise typer.Exit(status([coupled], within=not coupled.fallen))
+    with progress_bars(quiet) as progress:
+        done = orchestrator.run(
+            scenario,
+            set=set_,
+            robot=robot,
+            master=master,
+            macro_step=macro_step,
+            stop=stop,
+            timeout=timeout,
+            out=True if out is None else out,
+            progress=progress,
+        )
+    print_run(done)
+    print(f"results in {done.directory}")
+    complain_of([done])
+    raise typer.Exit(done.exit_status)
 
 
 @app.command()
@@ -196,28 +193,32 @@ def compare(
     quiet: Quiet = False,
 ) -> None:
     """Run a scenario coupled and with the monolithic solver, and say how large the coupling error is."""
-    from orchestrator.coupling.run.results import RunDirectory
+    from orchestrator.api import Unfinished
 
-    first = _load(scenario, robot, set_, master, macro_step, stop, timeout)
-    variants = _variants(first, masters, macro_steps, lambda m, h: _load(scenario, robot, set_, m, h, stop, timeout))
-    path, runs = _free(out, f"{first.name}-compare"), []
-    steps = sorted({v.simulation.macro_step for v in variants})
     try:
-        with progress_bars(quiet) as show:
-            for v in variants:
-                runs.append(run_coupled(v, show(_task(v), v.simulation.stop_time)))
-            reference = solve_reference(first, steps, show("reference", first.simulation.stop_time))
-    except RunError as error:
-        if runs:
-            write_runs(RunDirectory(path), runs, str(error))
-            status(runs, within=True)
-            print(f"results so far in {path}")
+        with progress_bars(quiet) as progress:
+            done = orchestrator.compare(
+                scenario,
+                masters=_items(masters),
+                macro_steps=_numbers(macro_steps),
+                set=set_,
+                robot=robot,
+                master=master,
+                macro_step=macro_step,
+                stop=stop,
+                timeout=timeout,
+                out=True if out is None else out,
+                progress=progress,
+            )
+    except Unfinished as error:
+        complain_of(error.runs)
+        print(f"results so far in {error.directory}")
         raise
-    comparison = compared(runs, reference)
-    write_comparison(RunDirectory(path), comparison, runs)
-    print_comparison(comparison)
-    print(f"verdict: {'pass' if comparison.passed else 'FAIL'}; results in {path}, pictures in {path / 'plots'}")
-    raise typer.Exit(status(runs, comparison.passed and not any(coupled.fallen for coupled in runs)))
+    print_comparison(done)
+    folder = done.directory
+    print(f"verdict: {'pass' if done.passed else 'FAIL'}; results in {folder}, pictures in {folder}/plots")
+    complain_of(done.results)
+    raise typer.Exit(done.exit_status)
 
 
 @app.command()
@@ -230,21 +231,22 @@ def modes(
     """Natural frequencies, damping ratios and shapes of the scenario's cable about its static equilibrium."""
     from rich.table import Table
 
+    from orchestrator.api import load_scenario
     from orchestrator.landing import modes as vibration
     from orchestrator.report.modes import write as write_modes
 
-    loaded = _load(scenario, None, set_)
-    path = None if out is None else _free(out, loaded.name)
-    found = vibration.of_scenario(loaded, count)
+    if out is not None and out.exists():
+        raise InputError(f"{out}: exists already; remove it or choose another with --out")
+    found = vibration.of_scenario(load_scenario(scenario, set=set_), count)
     table = Table("mode", "out of plane \\[Hz]", "damping", "in plane \\[Hz]", "damping", box=None, pad_edge=False)
     groups = (found.out_of_plane, found.in_plane)
     for k in range(max(group.frequency.size for group in groups)):
         cells = [f"{x[k]:{form}}" if k < x.size else "" for g in groups for x, form in g.columns()]
         table.add_row(str(k + 1), *cells)
     print_table(table)
-    if path is not None:
-        write_modes(found, path)
-        print(f"table and picture in {path}")
+    if out is not None:
+        write_modes(found, out)
+        print(f"table and picture in {out}")
 
 
 @app.command()
@@ -257,62 +259,16 @@ def report(
     print(make(directory))
 
 
-def _load(
-    path: str,
-    robot: str | None,
-    overrides: list[str] | None,
-    master: str | None = None,
-    macro_step: float | None = None,
-    stop: float | None = None,
-    timeout: float | None = None,
-) -> Scenario:
-    """Return the scenario with the options of the command line in place of its own values."""
-    from orchestrator.scenario.read import load
-
-    options = {"macro_step": macro_step, "stop_time": stop, "timeout": timeout}
-    settings = [f"simulation.{key}={float(value)!r}" for key, value in options.items() if value is not None]
-    scenario = load(path, [*settings, *(overrides or [])], robot, master)
-    for note in scenario.notes:
-        complain_once(note)
-    return scenario
-
-
-def _variants(
-    first: Scenario,
-    masters: str | None,
-    macro_steps: str | None,
-    load: Callable[[str | None, float | None], Scenario],
-) -> list[Scenario]:
-    """Return the scenario for every pair of master and macro step that is asked for."""
-    names = _items(masters) or [first.simulation.master]
+def _numbers(text: str | None) -> list[float]:
+    """Return the macro steps of ``--macro-steps``."""
     try:
-        steps = [float(text) for text in _items(macro_steps)] or [first.simulation.macro_step]
+        return [float(item) for item in _items(text)]
     except ValueError:
-        raise InputError(f"--macro-steps {macro_steps}: write numbers with commas between, 0.01,0.005") from None
-    return [load(name, step) for name in dict.fromkeys(names) for step in dict.fromkeys(steps)]
+        raise InputError(f"--macro-steps {text}: write numbers with commas between, 0.01,0.005") from None
 
 
 def _items(text: str | None) -> list[str]:
     return [item.strip() for item in (text or "").split(",") if item.strip()]
-
-
-def _free(out: Path | None, name: str) -> Path:
-    """Return the directory to be made; `InputError`, before anything is run, if it exists or cannot be made."""
-    from orchestrator.coupling.run.results import default_directory
-
-    path = out or default_directory(name)
-    if path.exists():
-        raise InputError(f"{path}: exists already; remove it or choose another with --out")
-    parent = next(p for p in path.absolute().parents if p.exists())
-    if not (parent.is_dir() and os.access(parent, os.W_OK)):
-        raise InputError(f"{path}: cannot be made, {parent} is no folder to write to; choose another with --out")
-    return path
-
-
-def _task(scenario: Scenario) -> str:
-    from orchestrator.runs.record import run_label
-
-    return run_label(scenario.simulation.master, scenario.simulation.macro_step)
 
 
 def main(arguments: list[str] | None = None) -> None:

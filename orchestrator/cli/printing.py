@@ -3,81 +3,62 @@
 from __future__ import annotations
 
 import sys
-from collections.abc import Callable, Iterator
+import warnings
+from collections.abc import Callable, Iterable, Iterator
 from contextlib import contextmanager
-from functools import cache
-from typing import TYPE_CHECKING
+from typing import TYPE_CHECKING, Any
 
-from orchestrator.coupling.errors import DONE, FAILED, INTERRUPTED, MISSED
+from orchestrator.coupling.errors import Notice
 
 if TYPE_CHECKING:
     from orchestrator.runs.compare import Comparison
-    from orchestrator.runs.record import Coupled
+    from orchestrator.runs.result import Run
 
 
-def status(runs: list[Coupled], within: bool) -> int:
-    """Return the exit status, and say on stderr what failed."""
-    from orchestrator.coupling.run.interrupt import Interruption
-
-    status = DONE if within and not any(coupled.log.unconverged for coupled in runs) else MISSED
-    for coupled in runs:
-        if coupled.log.unconverged:
-            complain(f"{coupled.label}: {_unconverged(coupled)}")
-        for contact in coupled.fallen:
-            complain(f"{contact}: the cable left the groove; the robot has fallen off")
-        drift = coupled.energy.warning() if coupled.energy is not None else None
-        if drift is not None:
-            complain(f"{coupled.label}: {drift}")
-        if coupled.log.error is not None:
-            complain(f"{coupled.label}: {coupled.log.error}; the results up to there are kept")
-            status = INTERRUPTED if isinstance(coupled.log.error, Interruption) else FAILED
-    return status
+def complain_of(runs: Iterable[Run]) -> None:
+    """Say on stderr what went wrong in `runs`."""
+    for run in runs:
+        for line in run.warnings:
+            complain(f"{run.label}: {line}")
 
 
-def _unconverged(coupled: Coupled) -> str:
-    """Return how many macro steps did not converge, where, and what helps."""
-    log, steps = coupled.log, [step for step in coupled.log.steps if not step.converged]
-    return (
-        f"{len(steps)} of {len(log.steps)} macro steps did not converge, the first at t = {steps[0].time:g} s (residual "
-        f"{steps[0].residual:.1e}); see iterations.csv, take a smaller macro step or another implicit master"
-    )
-
-
-def print_run(coupled: Coupled) -> None:
+def print_run(run: Run) -> None:
+    """Print the extremes of the main signals, the cost, the estimated error and the drift of the energy."""
     from rich.table import Table
 
     from orchestrator.report.plots import panels_for
 
-    if coupled.exchange_asked != coupled.exchange:
-        complain(
-            f"cable or robot has no means or slopes for exchange {coupled.exchange_asked}: {coupled.exchange} in its place"
-        )
-    log, table = coupled.log, Table("signal", "unit", "start", "min", "max", "end", box=None, pad_edge=False)
-    for panel in panels_for(coupled.table):
-        values = coupled.table[panel.signal] * panel.factor
+    summary, units = run.summary, run.summary["units"]
+    if summary["exchange_asked"] != summary["exchange"]:
+        asked, got = summary["exchange_asked"], summary["exchange"]
+        complain(f"cable or robot has no means or slopes for exchange {asked}: {got} in its place")
+    table = Table("signal", "unit", "start", "min", "max", "end", box=None, pad_edge=False)
+    for panel in panels_for(run.table, units=units):
+        values = run.table[panel.signal] * panel.factor
         numbers = (values[0], values.min(), values.max(), values[-1])
         table.add_row(panel.signal, panel.unit, *(f"{number:.5g}" for number in numbers))
     print_table(table)
     print(
-        f"{coupled.master}, macro step {log.macro_step:g} s: {len(log.steps)} steps, "
-        f"{log.iterations_per_step:.2f} iterations a step, {log.unconverged} unconverged, {log.wall:.2f} s"
+        f"{run.master}, macro step {run.macro_step:g} s: {summary['steps']} steps, "
+        f"{summary['iterations_per_step']:.2f} iterations a step, {summary['unconverged_steps']} unconverged, "
+        f"{summary['wall_s']:.2f} s"
     )
-    for line in _estimates(coupled):
+    for line in _estimates(run):
         print(line)
-    if coupled.energy is not None:
-        print(f"energy drift: {coupled.energy.drift:.2g} J of {coupled.energy.exchanged:.3g} J exchanged")
+    if run.energy is not None:
+        print(f"energy drift: {run.energy.drift:.2g} J of {run.energy.exchanged:.3g} J exchanged")
 
 
-def _estimates(coupled: Coupled) -> Iterator[str]:
+def _estimates(run: Run) -> Iterator[str]:
     """Yield a line for each signal with a tolerance: its estimated error beside what is allowed."""
-    from orchestrator.runs.compare import CONSTANT
+    from orchestrator.runs.result import CONSTANT
 
-    for name, error in coupled.estimated_error.items():
-        values, tolerance = coupled.table[name], coupled.scenario.simulation.tolerances[name]
+    for name, error in run.estimated_error.items():
+        values, tolerance = run.table[name], run.tolerances[name]
         share = error / max(float(values.max() - values.min()), CONSTANT)
-        if coupled.estimate_failure:
-            kind = coupled.scenario.simulation.estimate
-            yield f"estimated error of {name}: not known, the {kind} run failed: {coupled.estimate_failure}"
+        if run.estimate_failure:
+            kind = run.summary["estimate"]
+            yield f"estimated error of {name}: not known, the {kind} run failed: {run.estimate_failure}"
             continue
         verdict = "within" if share <= tolerance else "MISSED"
         yield f"estimated error of {name}: {error:.1e} ({share:.1e} of its range, allowed {tolerance:g}): {verdict}"
@@ -86,7 +67,7 @@ def _estimates(coupled: Coupled) -> Iterator[str]:
 def print_comparison(comparison: Comparison) -> None:
     from rich.table import Table
 
-    from orchestrator.runs.record import verdict_word
+    from orchestrator.runs.result import verdict_word
 
     reference = comparison.reference
     print(f"reference: {reference.kind}, {reference.wall_s:.2f} s")
@@ -132,31 +113,39 @@ def markup(text: str) -> str:
 
 
 @contextmanager
-def progress_bars(quiet: bool) -> Iterator[Callable[[str, float], Callable[[float], None]]]:
-    """Give a function that starts a bar, and returns what tells the bar how far the run is."""
+def progress_bars(quiet: bool) -> Iterator[Callable[[str, float, float], None]]:
+    """Give what shows a bar for each task, and how far it is."""
     from rich.console import Console
-    from rich.progress import BarColumn, Progress, TextColumn, TimeElapsedColumn, TimeRemainingColumn
+    from rich.progress import BarColumn, Progress, TaskID, TextColumn, TimeElapsedColumn, TimeRemainingColumn
 
     columns = (
         TextColumn("{task.description}"),
         BarColumn(),
         TextColumn("{task.completed:.2f} of {task.total:g} s"),
     )
-    console = Console(stderr=True, quiet=quiet)
+    console, tasks = Console(stderr=True, quiet=quiet), dict[str, TaskID]()
     with Progress(*columns, TimeElapsedColumn(), TimeRemainingColumn(), console=console, disable=quiet) as bars:
 
-        def start(description: str, total: float) -> Callable[[float], None]:
-            task = bars.add_task(description, total=total)
-            return lambda time: bars.update(task, completed=time)
+        def show(task: str, time: float, stop: float) -> None:
+            if task not in tasks:
+                tasks[task] = bars.add_task(task, total=stop)
+            bars.update(tasks[task], completed=time)
 
-        yield start
+        yield show
 
 
 def complain(message: str) -> None:
     print(f"orchestrator: {message}", file=sys.stderr)
 
 
-@cache
-def complain_once(message: str) -> None:
-    """Print it on stderr, but once in a command, which may read a scenario many times."""
-    complain(message)
+def show_notices() -> None:
+    """Let notices appear as complaints do; other warnings stay as they are."""
+    others = warnings.showwarning
+
+    def show(message: Warning | str, category: type[Warning], *where: Any) -> None:
+        if issubclass(category, Notice):
+            complain(str(message))
+        else:
+            others(message, category, *where)
+
+    warnings.showwarning = show

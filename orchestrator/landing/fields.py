@@ -6,12 +6,16 @@ from collections.abc import Mapping
 
 import numpy as np
 
-from fmus.cable.module import N_SHAPE, Cable
-from orchestrator.scenario.types import LandingScenario
+from fmus.cable.module import N_SHAPE
 
 
-def cable_fields(scenario: LandingScenario, table: Mapping[str, np.ndarray]) -> dict[str, np.ndarray]:
+def cable_fields(table: Mapping[str, np.ndarray], length: float) -> dict[str, np.ndarray]:
     """Return shape and tension of the cable over time from its signals; empty if it does not show them.
+
+    Parameters
+    ----------
+    table : signals over time
+    length : unstretched length of the cable, m
 
     Returns
     -------
@@ -24,7 +28,6 @@ def cable_fields(scenario: LandingScenario, table: Mapping[str, np.ndarray]) -> 
         [np.stack([table[f"cable.shape[{i}].position.{axis}"] for axis in "xyz"], axis=-1) for i in points], axis=1
     )
     tension = np.stack([table[f"cable.shape[{i}].tension"] for i in points], axis=1)
-    length = float(scenario.cable.parameters.get("unstretched_length", Cable.table["unstretched_length"].start))
     return {
         "time": np.asarray(table["time"]),
         "arc_length": np.linspace(0.0, length, N_SHAPE),

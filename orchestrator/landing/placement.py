@@ -21,10 +21,18 @@ from fmus.robot.module import Robot
 
 @dataclass(frozen=True)
 class Placement:
-    """Where the robot starts: its ``initial.*`` parameters, and the arc length under each wheel."""
+    """Where the robot starts, on the cable at rest.
+
+    Attributes
+    ----------
+    initial : parameters ``initial.*`` of the robot
+    arc_lengths : unstretched arc length under each wheel, m
+    cable_length : unstretched length of the cable, m
+    """
 
     initial: dict[str, float]
     arc_lengths: list[float]
+    cable_length: float
 
 
 def touching_distance(contact: Contact) -> float:
@@ -86,7 +94,7 @@ def place(
         "initial.velocity.z": -velocity,
         "initial.roll": float(angles[0] + found[2]),
     }
-    return Placement(initial, [foot[0] for foot in feet])
+    return Placement(initial, [foot[0] for foot in feet], cable["unstretched_length"])
 
 
 def _mount(robot: Robot, k: int) -> np.ndarray:

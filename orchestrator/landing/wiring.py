@@ -7,13 +7,11 @@ from pathlib import Path
 
 from fmus.module.variables import Value
 from orchestrator.catalogue import library
-from orchestrator.coupling.errors import InputError
 from orchestrator.coupling.fmu.instance import Fmu
 from orchestrator.coupling.fmu.sub_steps import instance
 from orchestrator.coupling.graph.graph import Graph
 from orchestrator.coupling.graph.links import Connection
-from orchestrator.landing.build import parts, placed
-from orchestrator.scenario.types import LandingScenario
+from orchestrator.landing.resolve import Landing
 
 INNER_STEPS = {"waveform": 4, "hermite": 4, "point": 1}
 """Inner steps of our cable in a macro step, where the scenario gives no `integration_step`. The error that they leave
@@ -23,27 +21,22 @@ LONGEST_ADAPTIVE = 2.5e-3
 not tell that of the cable's inner steps (docs/notebook/adaptive.md)."""
 
 
-def landing_graph(scenario: LandingScenario, exchange: str) -> Graph:
+def landing_graph(landing: Landing, exchange: str) -> Graph:
     """Return the graph of loaded FMUs: cable, robot, one contact a wheel, connected by the contract.
 
     `waveform` becomes `hermite` where cable or robot does not give its means, `point` where one takes no slopes.
     """
-    resolved, (_, placement) = parts(scenario), placed(scenario)
     components: dict[str, Fmu] = {}
     try:
-        components["cable"] = instance(scenario.cable.fmu or library.cable_fmu(), "cable", scenario.cable.steps)
-        components["cable"].set_parameters(_inner_step(scenario, exchange) | resolved.cable)
-        robot = library.robot_fmu(resolved.spec) if resolved.spec is not None else Path(str(scenario.robot.fmu))
-        components["robot"] = instance(robot, "robot", scenario.robot.steps)
-        initial = {n: v for n, v in placement.initial.items() if n in components["robot"].ports}
-        if not all(f"initial.position.{axis}" in initial for axis in "yz"):
-            raise InputError(f"{robot}: has no parameters initial.position.*: the robot cannot be placed")
-        components["robot"].set_parameters(dict(scenario.robot.parameters) | initial | scenario.robot.inputs)
+        components["cable"] = instance(_cable(landing), "cable", landing.cable.steps)
+        components["cable"].set_parameters(_inner_step(landing, exchange) | dict(landing.cable.settings))
+        components["robot"] = instance(_robot(landing), "robot", landing.robot.steps)
+        components["robot"].set_parameters(landing.robot.settings)
         exchange = _possible(exchange, components)
-        for k, s in enumerate(placement.arc_lengths, start=1):
-            contact = Fmu(scenario.contact.fmu or library.contact_fmu(), f"contact{k}")
-            components[f"contact{k}"] = contact
-            contact.set_parameters(resolved.contact | {"initial.s": s, "exchange": exchange})
+        contact = landing.contact.foreign or library.contact_fmu()
+        for k, s in enumerate(landing.placement.arc_lengths, start=1):
+            components[f"contact{k}"] = Fmu(contact, f"contact{k}")
+            components[f"contact{k}"].set_parameters({**landing.contact.settings, "initial.s": s, "exchange": exchange})
         return Graph(components, _connections(components, exchange), order=tuple(components))
     except BaseException:
         for fmu in components.values():
@@ -51,12 +44,21 @@ def landing_graph(scenario: LandingScenario, exchange: str) -> Graph:
         raise
 
 
-def _inner_step(scenario: LandingScenario, exchange: str) -> dict[str, Value]:
+def _cable(landing: Landing) -> Path:
+    return landing.cable.foreign or library.cable_fmu()
+
+
+def _robot(landing: Landing) -> Path:
+    spec = landing.sources.spec
+    return library.robot_fmu(spec) if spec is not None else Path(str(landing.robot.foreign))
+
+
+def _inner_step(landing: Landing, exchange: str) -> dict[str, Value]:
     """Return the longest inner step of our own cable."""
-    step = scenario.simulation.macro_step / INNER_STEPS[exchange]
-    if scenario.master.get("local_tolerance"):
+    step = landing.scenario.simulation.macro_step / INNER_STEPS[exchange]
+    if landing.scenario.master.get("local_tolerance"):
         step = min(step, LONGEST_ADAPTIVE)
-    return {"integration_step": step} if scenario.cable.fmu is None else {}
+    return {"integration_step": step} if landing.cable.foreign is None else {}
 
 
 def _possible(exchange: str, components: Mapping[str, Fmu]) -> str:

@@ -1,16 +1,16 @@
-"""Pictures and a page, from the tables of a run or a comparison, just made or read back."""
+"""Pictures and a page, drawn from the directory of a run or a comparison alone."""
 
 from __future__ import annotations
 
-from collections.abc import Iterable, Mapping, Sequence
+from collections.abc import Iterable
 from html import escape
 from pathlib import Path
 from typing import Any
 
-from orchestrator.coupling.errors import InputError
-from orchestrator.coupling.run.results import Table, read_fields, read_json, read_table, replacing
+from orchestrator.coupling.run.results import Table, read_json, replacing
 from orchestrator.runs.compare import Comparison
-from orchestrator.runs.record import Record, run_label, verdict_word
+from orchestrator.runs.files import read_comparison, read_run, require_finished
+from orchestrator.runs.result import Run, verdict_word
 
 PAGE = """<!doctype html>
 <meta charset="utf-8"><title>{title}</title>
@@ -23,72 +23,70 @@ img{{max-width:100%;margin:1em 0}}</style>
 """
 
 
-def draw_run(directory: Path, record: Record, reference: Table | None, tolerances: Mapping[str, float]) -> None:
-    """Draw the pictures of one run into ``plots``; `tolerances` are those of the signals that it is judged by."""
-    from orchestrator.landing import audit
+def draw(directory: Path) -> None:
+    """Draw the pictures of a run or a comparison, and of its runs, into ``plots``, from what stands in `directory`."""
+    if not (directory / "comparison.json").is_file():
+        if (directory / "results.csv").is_file():
+            draw_run(directory, read_run(directory))
+        return
+    comparison = read_comparison(directory)
+    for run in comparison.results:
+        draw_run(directory / run.label, run, comparison.reference.table)
+    draw_comparison(directory, comparison)
+
+
+def draw_run(directory: Path, run: Run, reference: Table | None = None) -> None:
+    """Draw the pictures of one run into ``plots``."""
     from orchestrator.report import plots
 
-    if len(record.table["time"]) < 2:
+    if len(run.time) < 2:
         return
     folder = directory / "plots"
-    panels = plots.panels_for(record.table, reference, list(tolerances))
-    plots.overview(folder / "overview.png", record.table, reference, panels)
-    plots.iterations(folder / "iterations.png", {record.legend: record.steps})
-    if record.fields and "robot.body.position.z" in record.table:
-        plots.shapes(folder / "shapes.png", record.fields, record.table)
-    energy = audit.of_coupled(record.table, tolerances.values())
-    if energy is not None:
-        plots.energy(folder / "energy.png", energy)
+    panels = plots.panels_for(run.table, reference, list(run.tolerances), run.summary["units"])
+    plots.overview(folder / "overview.png", run.table, reference, panels)
+    plots.iterations(folder / "iterations.png", {legend(run): run.iterations})
+    if run.fields and "robot.body.position.z" in run.table:
+        plots.shapes(folder / "shapes.png", run.fields, run.table)
+    if run.energy is not None:
+        plots.energy(folder / "energy.png", run.energy)
 
 
-def draw_comparison(directory: Path, comparison: Comparison, records: Sequence[Record]) -> None:
+def draw_comparison(directory: Path, comparison: Comparison) -> None:
     """Draw the pictures of all runs together, and the overview of the first."""
     from orchestrator.report import plots
 
-    records = [record for record in records if len(record.table["time"]) > 1]
-    if not records:
+    runs = [run for run in comparison.results if len(run.time) > 1]
+    if not runs:
         return
     folder, reference, signals = directory / "plots", comparison.reference.table, list(comparison.tolerance)
-    panels = plots.panels_for(records[0].table, reference, signals)
-    plots.overview(folder / "overview.png", records[0].table, reference, panels)
-    plots.errors(folder / "errors.png", {r.legend: r.table for r in records}, reference, panels)
-    plots.iterations(folder / "iterations.png", {r.legend: r.steps for r in records})
-    if records[0].fields and "robot.body.position.z" in records[0].table:
-        plots.shapes(folder / "shapes.png", records[0].fields, records[0].table)
+    first = runs[0]
+    panels = plots.panels_for(first.table, reference, signals, first.summary["units"])
+    plots.overview(folder / "overview.png", first.table, reference, panels)
+    plots.errors(folder / "errors.png", {legend(run): run.table for run in runs}, reference, panels)
+    plots.iterations(folder / "iterations.png", {legend(run): run.iterations for run in runs})
+    if first.fields and "robot.body.position.z" in first.table:
+        plots.shapes(folder / "shapes.png", first.fields, first.table)
     if len({run.macro_step for run in comparison.runs}) > 1 and signals:
         plots.convergence(folder / "convergence.png", comparison)
     if len(comparison.runs) > 1 and signals:
         plots.work_precision(folder / "work_precision.png", comparison)
 
 
+def legend(run: Run) -> str:
+    """Return master and macro step, for people."""
+    return f"{run.master}, {1e3 * run.macro_step:g} ms"
+
+
 def report(directory: Path) -> Path:
     """Draw the pictures of a finished run or comparison anew and return the page that shows them."""
-    if not (directory / "manifest.json").is_file():
-        raise InputError(f"{directory}: no manifest.json; it is not the directory of a finished run")
+    require_finished(directory)
     manifest = read_json(directory / "manifest.json")
-    tolerances = manifest["resolved"]["simulation"]["tolerances"]
+    draw(directory)
     if (directory / "comparison.json").is_file():
-        content = read_json(directory / "comparison.json")
-        comparison = Comparison.from_content(content, read_table(directory / "reference.csv"))
-        labels = [run_label(run.master, run.macro_step) for run in comparison.runs]
-        draw_comparison(directory, comparison, [read_record(directory / label) for label in labels])
-        rows = _comparison_rows(comparison)
+        rows = _comparison_rows(read_comparison(directory))
     else:
-        draw_run(directory, read_record(directory), None, tolerances)
         rows = _summary_rows(read_json(directory / "summary.json"))
     return _write_page(directory, manifest, rows)
-
-
-def read_record(directory: Path) -> Record:
-    """Return what the run in `directory` left."""
-    summary = read_json(directory / "summary.json")
-    return Record(
-        summary["master"],
-        summary["macro_step"],
-        read_table(directory / "results.csv"),
-        read_table(directory / "iterations.csv"),
-        read_fields(directory / "fields.h5"),
-    )
 
 
 def _comparison_rows(comparison: Comparison) -> list[tuple[str, ...]]:

@@ -9,6 +9,7 @@ from collections.abc import Iterator, Mapping, Sequence
 from contextlib import contextmanager, suppress
 from dataclasses import dataclass
 from pathlib import Path
+from types import MappingProxyType
 from typing import Any
 
 import matplotlib
@@ -77,12 +78,17 @@ LANDING = (
 RELATIVE_TO_START = {"robot.body.position.z"}
 
 
-def panels_for(table: Table, reference: Table | None = None, chosen: Sequence[str] = ()) -> list[Panel]:
-    """Return the panels of a landing, or those of the `chosen` signals, else of the first four."""
+def panels_for(
+    table: Table,
+    reference: Table | None = None,
+    chosen: Sequence[str] = (),
+    units: Mapping[str, str] = MappingProxyType({}),
+) -> list[Panel]:
+    """Return the panels of a landing, or those of the `chosen` signals in their `units`, else of the first four."""
     common = [name for name in table if name != "time" and (reference is None or name in reference)]
     landing = [panel for panel in LANDING if panel.signal in common]
     names = [name for name in chosen if name in common] or common[:4]
-    return landing or [Panel(name, name, "FMU's unit") for name in names]
+    return landing or [Panel(name, name, units.get(name) or "FMU's unit") for name in names]
 
 
 def overview(path: Path, run: Table, reference: Table | None, panels: Sequence[Panel]) -> None:

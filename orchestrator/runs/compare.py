@@ -3,7 +3,8 @@
 from __future__ import annotations
 
 from collections.abc import Mapping
-from dataclasses import dataclass, field
+from dataclasses import asdict, dataclass, field
+from pathlib import Path
 from typing import Any
 
 import numpy as np
@@ -15,13 +16,10 @@ from orchestrator.coupling.run.compare import (
 )
 from orchestrator.coupling.run.results import Table
 from orchestrator.landing.audit import Audit, of_monolithic
-from orchestrator.runs.record import Coupled
+from orchestrator.runs.result import CONSTANT, EXIT_STATUS, Run, Verdict, pandas_module, run_label
 
 REFERENCE_MARGIN = 0.1
 """The reference's own error may be this part of a tolerance, or the verdict means nothing."""
-CONSTANT = 1e-6
-"""A signal whose reference moves by less than this (m, rad …) counts as constant: the verdict then takes this as its
-scale, as for the roll of a landing at midspan, which is zero by symmetry."""
 
 
 @dataclass
@@ -45,8 +43,8 @@ class Reference:
 
 
 @dataclass
-class Run:
-    """One coupled run, held against the reference."""
+class RunErrors:
+    """One coupled run held against the reference: what it cost, and how wrong each signal is."""
 
     master: str
     macro_step: float
@@ -56,6 +54,11 @@ class Run:
     cable_steps: int
     wall_s: float
     signals: dict[str, SignalError]
+
+    @property
+    def label(self) -> str:
+        """Master and macro step, as folders are called."""
+        return run_label(self.master, self.macro_step)
 
 
 @dataclass(frozen=True)
@@ -71,13 +74,23 @@ class Check:
     note: str = ""
 
 
-@dataclass
+@dataclass(repr=False)
 class Comparison:
-    """All runs against one reference; `tolerance` is the largest `relative_max_error` by signal."""
+    """All runs against one reference.
+
+    Attributes
+    ----------
+    runs : cost and errors of every run, as in ``comparison.json``
+    tolerance : the largest `relative_max_error` allowed, by signal
+    results : the runs themselves, with their signals, in the same order
+    directory : where it was written; None if it was not
+    """
 
     reference: Reference
-    runs: list[Run]
+    runs: list[RunErrors]
     tolerance: dict[str, float]
+    results: list[Run] = field(default_factory=list)
+    directory: Path | None = None
 
     @property
     def checks(self) -> list[Check]:
@@ -97,6 +110,20 @@ class Comparison:
     def passed(self) -> bool:
         """Whether every run meets every tolerance, with every macro step converged."""
         return all(check.passed for check in self.checks) and not any(run.unconverged_steps for run in self.runs)
+
+    @property
+    def verdict(self) -> Verdict:
+        """``within`` or ``missed``; ``failed`` or ``interrupted`` if a run ended before its time."""
+        verdicts = [run.verdict for run in self.results]
+        for verdict in reversed(verdicts):
+            if verdict in ("failed", "interrupted"):
+                return verdict
+        return "within" if self.passed and "missed" not in verdicts else "missed"
+
+    @property
+    def exit_status(self) -> int:
+        """The exit status of ``orchestrator compare``: 0 within, 1 missed, 3 failed, 130 interrupted."""
+        return EXIT_STATUS[self.verdict]
 
     @property
     def observed_order(self) -> dict[str, dict[str, float]]:
@@ -122,23 +149,37 @@ class Comparison:
             "verdict": "pass" if self.passed else "fail",
         }
 
+    def frame(self) -> Any:
+        """Return errors and cost as a pandas ``DataFrame``, a row a run and signal; `ImportError` without pandas."""
+        rows = [
+            {"master": run.master, "macro_step": run.macro_step, "signal": name, **asdict(error), "wall_s": run.wall_s}
+            for run in self.runs
+            for name, error in run.signals.items()
+        ]
+        return pandas_module().DataFrame(rows)
+
+    def __repr__(self) -> str:
+        place = f"; {self.directory}" if self.directory is not None else ""
+        return f"Comparison({len(self.runs)} runs against {self.reference.kind}, {self.verdict}{place})"
+
     @classmethod
     def from_content(cls, content: Mapping[str, Any], table: Table) -> Comparison:
         """Return the comparison that ``comparison.json`` and ``reference.csv`` hold."""
-        reference = Reference(table=table, **content["reference"])
+        known = content["reference"]
+        reference = Reference(known["kind"], table, known["wall_s"], _numbers(known["estimated_error"], "nan"))
         runs = [
-            Run(**{**run, "signals": {n: SignalError(**_numbers(e)) for n, e in run["signals"].items()}})
+            RunErrors(**{**run, "signals": {n: SignalError(**_numbers(e)) for n, e in run["signals"].items()}})
             for run in content["runs"]
         ]
         return cls(reference, runs, content["tolerance"])
 
 
-def _numbers(values: Mapping[str, float | None]) -> dict[str, float]:
-    """Return `values` with the infinity back that JSON has as null."""
-    return {name: float("inf") if value is None else value for name, value in values.items()}
+def _numbers(values: Mapping[str, float | None], null: str = "inf") -> dict[str, float]:
+    """Return `values` with the number back that JSON, which has no infinity, has as null."""
+    return {name: float(null) if value is None else value for name, value in values.items()}
 
 
-def _check(run: Run, signal: str, tolerance: float, estimate: float | None) -> Check:
+def _check(run: RunErrors, signal: str, tolerance: float, estimate: float | None) -> Check:
     error = run.signals.get(signal)
     if error is None:
         note = "not among the signals of run and reference"
@@ -152,7 +193,7 @@ def _check(run: Run, signal: str, tolerance: float, estimate: float | None) -> C
     return Check(run.master, run.macro_step, signal, value, tolerance, value <= tolerance and not note, note)
 
 
-def _orders(runs: list[Run]) -> dict[str, float]:
+def _orders(runs: list[RunErrors]) -> dict[str, float]:
     steps = [run.macro_step for run in runs]
     if len(set(steps)) < 2:
         return {}
@@ -160,22 +201,22 @@ def _orders(runs: list[Run]) -> dict[str, float]:
     return {name: observed_order(steps, [run.signals[name].max_error for run in runs]) for name in common}
 
 
-def held_against(coupled: Coupled, reference: Reference) -> Run:
+def held_against(run: Run, reference: Reference) -> RunErrors:
     """Return the errors and the cost of one coupled run."""
-    log = coupled.log
-    return Run(
-        master=coupled.master,
-        macro_step=log.macro_step,
-        steps=len(log.steps),
-        iterations_per_step=log.iterations_per_step,
-        unconverged_steps=log.unconverged,
-        cable_steps=log.solves.get("cable", max(log.solves.values(), default=0)),
-        wall_s=log.wall,
-        signals=signal_errors(coupled.table, reference.table),
+    summary, solves = run.summary, run.summary["solves"]
+    return RunErrors(
+        master=run.master,
+        macro_step=run.macro_step,
+        steps=summary["steps"],
+        iterations_per_step=summary["iterations_per_step"],
+        unconverged_steps=summary["unconverged_steps"],
+        cable_steps=solves.get("cable", max(solves.values(), default=0)),
+        wall_s=summary["wall_s"],
+        signals=signal_errors(run.table, reference.table),
     )
 
 
-def compared(runs: list[Coupled], reference: Reference) -> Comparison:
+def compared(runs: list[Run], reference: Reference) -> Comparison:
     """Hold all runs against the reference."""
-    tolerance = runs[0].scenario.simulation.tolerances
-    return Comparison(reference, [held_against(coupled, reference) for coupled in runs], dict(tolerance))
+    held = [held_against(run, reference) for run in runs]
+    return Comparison(reference, held, dict(runs[0].tolerances), list(runs))

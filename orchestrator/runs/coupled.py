@@ -1,6 +1,12 @@
-"""A scenario carried out: the coupled run, the reference, their comparison, and the files of each."""
+"""A scenario run coupled."""
 
 from __future__ import annotations
+
+from collections.abc import Callable
+from dataclasses import dataclass, field
+from functools import cached_property
+
+import numpy as np
 
 from orchestrator.coupling.errors import InputError, RunError
 from orchestrator.coupling.fmu.instance import FmuError
@@ -8,22 +14,96 @@ from orchestrator.coupling.graph.graph import Graph
 from orchestrator.coupling.masters import StepReport
 from orchestrator.coupling.run.interrupt import interruptible
 from orchestrator.coupling.run.log import Log
+from orchestrator.coupling.run.results import Table
 from orchestrator.coupling.run.simulate import simulate
-from orchestrator.runs.components import master_of, opened, recorded, split_fields
-from orchestrator.runs.record import Coupled, Progress
+from orchestrator.landing import audit
+from orchestrator.runs.components import master_of, opened, recorded
+from orchestrator.runs.systems import System, resolve
 from orchestrator.scenario.types import Scenario
 
+LEFT_THE_GROOVE = 3
+"""Value of a contact's `status` when the cable has left the groove."""
+OF_A_STEP = (
+    "time", "iterations", "residual", "subdivisions", "rejected", "columns", "converged", "estimate", "power_residual",
+)  # fmt: skip
+"""What is kept of the report of a macro step."""
+Progress = Callable[[float], None]
+"""Told the time (s) that a run has come to."""
 
-def run_coupled(scenario: Scenario, progress: Progress = lambda _: None) -> Coupled:
-    """Run the scenario coupled. A failure in mid-run does not raise: `log.error` says it."""
-    with opened(scenario) as graph:
-        log = _simulated(scenario, graph, progress)
+
+@dataclass
+class Coupled:
+    """A scenario that was run coupled: the log, and what it was made from.
+
+    Attributes
+    ----------
+    table : signals at the communication points, ``time`` first
+    fields : arrays over time as in ``fields.h5``; empty for a general graph
+    units : of the signals, as the FMUs declare them
+    fmus : file and SHA-256 of every component
+    estimated_error : of the signals with a tolerance, in their units; empty where none was asked for, NaN where it failed
+    estimate_failure : why it failed
+    """
+
+    system: System
+    exchange: str
+    log: Log
+    table: Table
+    fields: dict[str, np.ndarray]
+    units: dict[str, str]
+    fmus: dict[str, dict[str, str]]
+    estimated_error: dict[str, float] = field(default_factory=dict)
+    estimate_failure: str = ""
+
+    @property
+    def scenario(self) -> Scenario:
+        """What was run."""
+        return self.system.scenario
+
+    @cached_property
+    def steps_table(self) -> Table:
+        """One row a macro step: what the master needed and reached."""
+        table = {name: np.array([getattr(step, name) for step in self.log.steps]) for name in OF_A_STEP}
+        return table | {f"power_residual.{name}": values for name, values in self.log.power_residual.items()}
+
+    @property
+    def master(self) -> str:
+        """The master by its name."""
+        return self.scenario.simulation.master
+
+    @property
+    def energy(self) -> audit.Audit | None:
+        """The energy audit; None where a component does not show its energy."""
+        return audit.of_coupled(self.table, self.scenario.simulation.tolerances.values())
+
+    @property
+    def fallen(self) -> list[str]:
+        """The contacts that the cable has left."""
+        return [
+            name.removesuffix(".status")
+            for name, values in self.table.items()
+            if name.startswith("contact") and name.endswith(".status") and np.any(values == LEFT_THE_GROOVE)
+        ]
+
+
+def run_coupled(system: System | Scenario, progress: Progress = lambda _: None) -> Coupled:
+    """Run a system coupled; a scenario is resolved first. A failure in mid-run does not raise: `log.error` says it."""
+    if isinstance(system, Scenario):
+        system = resolve(system)
+    with opened(system) as graph:
+        log = _simulated(system.scenario, graph, progress)
         fmus = {n: {"file": str(f.path), "sha256": f.sha256} for n, f in graph.components.items()}
         exchange = next((fmu.exchange for fmu in graph.components.values() if fmu.exchange), "")
+        units = {signal: _unit(graph, signal) for signal in log.signals}
     if log.error is not None and len(log.time) < 2:
         raise RunError(str(log.error), 0.0)
-    fields, table = split_fields(scenario, {"time": log.time, **dict(zip(log.signals, log.values.T, strict=True))})
-    return Coupled(scenario, exchange, log, table, fields, fmus)
+    fields, table = system.split({"time": log.time, **dict(zip(log.signals, log.values.T, strict=True))})
+    return Coupled(system, exchange, log, table, fields, {name: units[name] for name in table if name in units}, fmus)
+
+
+def _unit(graph: Graph, signal: str) -> str:
+    component, _, name = signal.partition(".")
+    return graph.components[component].ports[name].unit
 
 
 def _simulated(scenario: Scenario, graph: Graph, progress: Progress) -> Log:
@@ -44,11 +124,13 @@ def _simulated(scenario: Scenario, graph: Graph, progress: Progress) -> Log:
             raise RunError(str(error), error.time) from None
 
 
-def completed(scenario: Scenario, progress: Progress) -> Coupled:
+def completed(system: System, progress: Progress) -> Coupled:
+    """Run a system coupled to its end; `RunError` if it does not come there."""
     try:
-        coupled = run_coupled(scenario, progress)
+        coupled = run_coupled(system, progress)
     except InputError as error:  # an FMU that cannot be stepped so finely
-        raise RunError(f"no run with a macro step of {scenario.simulation.macro_step:g} s: {error}") from None
+        step = system.scenario.simulation.macro_step
+        raise RunError(f"no run with a macro step of {step:g} s: {error}") from None
     if coupled.log.error is not None:
         raise RunError(str(coupled.log.error), coupled.log.error.time)
     return coupled

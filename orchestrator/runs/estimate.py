@@ -12,24 +12,21 @@ What the estimate depends on is whether the error falls with the step, and at H/
 
 from __future__ import annotations
 
-from collections.abc import Iterator
-from pathlib import Path
+from typing import Any
 
-from orchestrator.catalogue import modules as vocabulary
 from orchestrator.coupling.errors import OrchestratorError
 from orchestrator.coupling.masters import MASTERS
 from orchestrator.coupling.masters.options import master_options
 from orchestrator.coupling.run.compare import largest_difference
-from orchestrator.runs.coupled import completed
-from orchestrator.runs.record import Coupled, Progress
-from orchestrator.scenario.types import CableSection, Component, GraphScenario, RobotSection, Scenario
+from orchestrator.runs.coupled import Coupled, Progress, completed
+from orchestrator.runs.systems import System
+from orchestrator.scenario.types import Scenario
 
 RATIOS = {"finer": 0.5, "coarser": 2.0}
 """Estimate → steps of the second run over those of the first."""
 TOLERANCES = {"tolerance": 10.0, "local_tolerance": 32.0}
 """By this the master's tolerances are multiplied where steps are doubled, and divided where they are halved: the error of
 the iteration changes about as much as that of the steps, a local error of order 5 as by doubled sub-steps."""
-INNER_STEP = "integration_step"
 
 
 def factor(scenario: Scenario, exchange: str) -> float:
@@ -43,42 +40,25 @@ def factor(scenario: Scenario, exchange: str) -> float:
     return (2**order if finer else 1) / (2**order - 1)
 
 
-def second(scenario: Scenario) -> Scenario | None:
-    """Return the second run's scenario; None if none is asked for, or one coarser of fewer than two macro steps."""
-    simulation = scenario.simulation
-    ratio = RATIOS.get(simulation.estimate)
+def second(system: System) -> System | None:
+    """Return what the second run is made of; None if none is asked for, or one coarser of fewer than two macro steps."""
+    scenario = system.scenario
+    ratio = RATIOS.get(scenario.simulation.estimate)
     if ratio is None:
         return None
-    step = ratio * simulation.macro_step
-    count = int(simulation.stop_time / step * (1.0 + 1e-9))
+    step = ratio * scenario.simulation.macro_step
+    count = int(scenario.simulation.stop_time / step * (1.0 + 1e-9))
     if count < 2:
         return None
-    copy = scenario.changed(macro_step=step, stop_time=count * step)
-    for section, inner in _inner_steps(copy):
-        section.parameters[INNER_STEP] = ratio * inner
-    options = master_options()[simulation.master] | copy.master
-    for name, change in TOLERANCES.items():
-        if options.get(name):
-            copy.master[name] = options[name] * (change if ratio > 1.0 else 1.0 / change)
-    return copy
+    changed = system.changed(_options(scenario, ratio), macro_step=step, stop_time=count * step)
+    return changed.stepped(ratio)
 
 
-def _inner_steps(scenario: Scenario) -> Iterator[tuple[CableSection | RobotSection | Component, float]]:
-    """Yield the sections of all components that have an inner step of their own, and that step, s.
-
-    That of our cable follows the macro step where the scenario gives none (`orchestrator.landing`).
-    """
-    sections: list[tuple[str, CableSection | RobotSection | Component]]
-    if isinstance(scenario, GraphScenario):
-        sections = [(str(component.model), component) for component in scenario.components.values()]
-    else:
-        sections = [("cable", scenario.cable), ("robot", scenario.robot)]
-    for module, section in sections:
-        if isinstance(section, CableSection) and not section.fmu and INNER_STEP not in section.parameters:
-            continue
-        known = vocabulary.of_fmu(Path(section.fmu)) if section.fmu else vocabulary.of_module(module)
-        if INNER_STEP in known and known[INNER_STEP].causality == "parameter":
-            yield section, float(section.parameters.get(INNER_STEP, known[INNER_STEP].start))
+def _options(scenario: Scenario, ratio: float) -> dict[str, Any]:
+    """Return the options of the master with tolerances that go with steps `ratio` times as long."""
+    all_options = master_options()[scenario.simulation.master] | scenario.master
+    by = {name: change if ratio > 1.0 else 1.0 / change for name, change in TOLERANCES.items()}
+    return dict(scenario.master) | {n: all_options[n] * change for n, change in by.items() if all_options.get(n)}
 
 
 def estimate_error(coupled: Coupled, progress: Progress = lambda _: None) -> Coupled | None:
@@ -90,7 +70,7 @@ def estimate_error(coupled: Coupled, progress: Progress = lambda _: None) -> Cou
         the second run; None where there is none, or it failed
     """
     scenario = coupled.scenario
-    again = second(scenario) if coupled.log.error is None else None
+    again = second(coupled.system) if coupled.log.error is None else None
     if again is None:
         return None
     signals = [name for name in scenario.simulation.tolerances if name in coupled.table]

@@ -1,115 +1,141 @@
-"""Who writes a run directory: tables, fields, summary, and last the manifest."""
+"""Who writes a run directory, and who reads it: tables, fields, summary, pictures, and last the manifest.
+
+The pictures are drawn by whoever calls, from the directory alone: a picture that fails is noted and loses no run.
+"""
 
 from __future__ import annotations
 
-from collections.abc import Mapping
+from collections.abc import Callable, Sequence
+from dataclasses import replace
+from pathlib import Path
 from typing import Any
 
 import numpy as np
 
-from orchestrator.coupling.run.results import RunDirectory
-from orchestrator.landing import audit
-from orchestrator.landing.fields import interface_balance
-from orchestrator.report.page import draw_comparison, draw_run
-from orchestrator.runs.compare import Comparison, Reference
-from orchestrator.runs.record import Coupled
-from orchestrator.scenario.types import LandingScenario, Scenario
+from orchestrator.coupling.errors import InputError
+from orchestrator.coupling.run.results import Table, read_fields, read_json, read_table
+from orchestrator.runs.compare import Comparison
+from orchestrator.runs.directory import RunDirectory
+from orchestrator.runs.result import Run
 
 FIELD_UNITS = {"time": "s", "arc_length": "m", "position": "m", "tension": "N"}
+COUNTS = {"iterations": int, "subdivisions": int, "rejected": int, "columns": int, "converged": bool}
+"""Columns of ``iterations.csv`` that are no real numbers."""
+Draw = Callable[[Path], None]
+"""Draws the pictures of a run or a comparison into its directory."""
 
 
-def summary(coupled: Coupled) -> dict[str, Any]:
-    """Return what ``summary.json`` holds: cost, convergence, extremes of the signals, interface work."""
-    log, scenario = coupled.log, coupled.scenario
-    simulated = float(log.time[-1] - log.time[0])
-    landing = scenario if isinstance(scenario, LandingScenario) else None
-    return {
-        "scenario": scenario.name,
-        "title": scenario.title,
-        "stiffness_set": landing.cable.stiffness_set if landing else None,
-        "robot": landing.robot.model or landing.robot.fmu if landing else None,
-        "master": coupled.master,
-        "exchange": coupled.exchange or None,
-        "macro_step": log.macro_step,
-        "simulated_s": simulated,
-        "wall_s": log.wall,
-        "wall_per_simulated_s": log.wall / simulated if simulated > 0.0 else None,
-        "wall_components_s": log.wall_components,
-        "steps": len(log.steps),
-        "solves": log.solves,
-        "iterations_per_step": log.iterations_per_step,
-        "unconverged_steps": log.unconverged,
-        "left_the_groove": coupled.fallen,
-        "energy": energy_content(coupled),
-        "interface_work_J": {name: float(work[-1]) for name, work in log.energy.items()},
-        "energy_residual_J": {name: float(np.max(np.abs(r))) for name, r in log.energy_residual.items()},
-        "estimated_error": coupled.estimated_error,
-        "interface_balance": interface_balance(coupled.table, log.energy),
-        "extremes": {n: _extremes(log.time, values) for n, values in coupled.table.items() if n != "time"},
-    }
+def no_pictures(_: Path) -> None:
+    """Draw nothing."""
 
 
-def energy_content(coupled: Coupled) -> dict[str, Any]:
-    """Return what ``summary.json`` says of the energy."""
-    if coupled.energy is not None:
-        return coupled.energy.content()
-    is_audited = isinstance(coupled.scenario, LandingScenario)
-    return {"verdict": None, "missing": audit.missing(coupled.table)} if is_audited else {}
+# -- writing --------------------------------------------------------------------------------------------------
 
 
-def _extremes(time: np.ndarray, values: np.ndarray) -> dict[str, float]:
-    low, high = int(np.argmin(values)), int(np.argmax(values))
-    pairs = {
-        "start": values[0],
-        "end": values[-1],
-        "min": values[low],
-        "min_time": time[low],
-        "max": values[high],
-    }
-    return {name: float(value) for name, value in {**pairs, "max_time": time[high]}.items()}
+def write_run(directory: RunDirectory, run: Run, draw: Draw = no_pictures) -> Run:
+    """Write all files of a run and return it as it stands there; one that ended early is marked as incomplete."""
+    _write_tables(directory, run)
+    return _finish(directory, run, _drawn(directory, draw))
 
 
-def write(directory: RunDirectory, coupled: Coupled, reference: Reference | None = None) -> None:
-    """Write all files of a coupled run, the manifest last; an interrupted run is marked as incomplete."""
-    directory.write_table("results.csv", coupled.table)
-    directory.write_table("iterations.csv", coupled.steps_table)
-    if coupled.fields:
-        directory.write_fields("fields.h5", coupled.fields, FIELD_UNITS)
-    directory.write_json("summary.json", summary(coupled))
-    tolerances = coupled.scenario.simulation.tolerances
-    draw_run(directory.path, coupled.record, reference.table if reference else None, tolerances)
-    error = coupled.log.error
-    directory.write_manifest(manifest(coupled.scenario, coupled.fmus), error=str(error) if error else None)
-
-
-def manifest(scenario: Scenario, fmus: Mapping[str, Any]) -> dict[str, Any]:
-    """Return what a run depends on: the resolved scenario, the source of each value, the FMUs."""
-    return {
-        "scenario": str(scenario.path),
-        "resolved": scenario.model_dump(exclude_none=True),
-        "provenance": dict(scenario.provenance),
-        "fmus": fmus,
-    }
-
-
-def write_runs(directory: RunDirectory, runs: list[Coupled], error: str) -> None:
-    """Write the runs of a comparison that could not be finished, a directory each, then the manifest with `error`."""
-    for coupled in runs:
-        write(RunDirectory(directory.path / coupled.label), coupled)
-    directory.write_manifest(manifest(runs[0].scenario, runs[0].fmus), error=error)
-
-
-def write_comparison(directory: RunDirectory, comparison: Comparison, runs: list[Coupled]) -> None:
-    """Write ``comparison.json``, the reference and one run directory for each run, then the manifest."""
-    reference, failures = comparison.reference, [str(c.log.error) for c in runs if c.log.error]
+def write_comparison(directory: RunDirectory, comparison: Comparison, draw: Draw = no_pictures) -> Comparison:
+    """Write ``comparison.json``, the reference and a run directory for each run, then the manifest."""
+    reference = comparison.reference
     directory.write_table("reference.csv", reference.table)
     if reference.fields:
         directory.write_fields("reference.h5", reference.fields, FIELD_UNITS)
-    for coupled in runs:
-        write(RunDirectory(directory.path / coupled.label), coupled, reference)
     if comparison.reference_energy is not None:
         directory.write_json("reference.json", {"energy": comparison.reference_energy.content()})
     directory.write_json("comparison.json", comparison.content())
-    draw_comparison(directory.path, comparison, [coupled.record for coupled in runs])
-    error = "; ".join(failures) or None
-    directory.write_manifest(manifest(runs[0].scenario, runs[0].fmus), error=error)
+    errors = [run.error for run in comparison.results if run.error]
+    results = _write_runs(directory, comparison.results, draw, "; ".join(errors) or None)
+    return replace(comparison, results=results, directory=directory.path)
+
+
+def write_unfinished(directory: RunDirectory, runs: Sequence[Run], error: str) -> None:
+    """Write the runs of a comparison that could not be finished, a directory each, then the manifest with `error`."""
+    _write_runs(directory, runs, no_pictures, error)
+
+
+def _write_runs(directory: RunDirectory, runs: Sequence[Run], draw: Draw, error: str | None) -> list[Run]:
+    folders = [RunDirectory(directory.path / run.label) for run in runs]
+    for folder, run in zip(folders, runs, strict=True):
+        _write_tables(folder, run)
+    missing = _drawn(directory, draw)
+    written = [_finish(folder, run, missing) for folder, run in zip(folders, runs, strict=True)]
+    directory.write_manifest(_dependencies(runs[0]) | {"pictures": missing}, error)
+    return written
+
+
+def _write_tables(directory: RunDirectory, run: Run) -> None:
+    directory.write_table("results.csv", run.table)
+    directory.write_table("iterations.csv", run.iterations)
+    if run.fields:
+        directory.write_fields("fields.h5", run.fields, FIELD_UNITS)
+    directory.write_json("summary.json", run.summary)
+
+
+def _drawn(directory: RunDirectory, draw: Draw) -> str | None:
+    """Let the pictures be drawn; return why there are none, if they cannot be."""
+    try:
+        draw(directory.path)
+    except Exception as error:  # whatever it is: the numbers are there, and worth more
+        return f"{type(error).__name__}: {error}"
+    return None
+
+
+def _finish(directory: RunDirectory, run: Run, missing: str | None) -> Run:
+    directory.write_manifest(_dependencies(run) | {"pictures": missing}, run.error)
+    return replace(run, directory=directory.path, manifest=read_json(directory.path / "manifest.json"))
+
+
+def _dependencies(run: Run) -> dict[str, Any]:
+    return {name: value for name, value in run.manifest.items() if name not in ("complete", "error")}
+
+
+# -- reading --------------------------------------------------------------------------------------------------
+
+
+def load_run(directory: Path | str) -> Run:
+    """Return the result of the finished run in `directory`; `InputError` if there is none."""
+    require_finished(Path(directory))
+    return read_run(Path(directory))
+
+
+def load_comparison(directory: Path | str) -> Comparison:
+    """Return the finished comparison in `directory`; `InputError` if there is none."""
+    require_finished(Path(directory))
+    return read_comparison(Path(directory))
+
+
+def require_finished(directory: Path) -> None:
+    """Raise `InputError` where `directory` is not that of a finished run or comparison."""
+    if not (directory / "manifest.json").is_file():
+        raise InputError(f"{directory}: no manifest.json; it is not the directory of a finished run")
+
+
+def read_run(directory: Path) -> Run:
+    """Return what the run in `directory` has left, its manifest still missing or not."""
+    manifest = directory / "manifest.json"
+    return Run(
+        read_table(directory / "results.csv"),
+        _counted(read_table(directory / "iterations.csv")),
+        read_fields(directory / "fields.h5"),
+        read_json(directory / "summary.json"),
+        read_json(manifest) if manifest.is_file() else {},
+        directory,
+    )
+
+
+def read_comparison(directory: Path) -> Comparison:
+    """Return the comparison in `directory` with its runs, its manifest still missing or not."""
+    comparison = Comparison.from_content(
+        read_json(directory / "comparison.json"), read_table(directory / "reference.csv")
+    )
+    comparison.reference.fields = read_fields(directory / "reference.h5")
+    results = [read_run(directory / run.label) for run in comparison.runs]
+    return replace(comparison, results=results, directory=directory)
+
+
+def _counted(table: Table) -> Table:
+    return {name: np.asarray(values, dtype=COUNTS.get(name, float)) for name, values in table.items()}

@@ -7,7 +7,7 @@ FMUs (``[components.NAME]`` and ``connections``). Every value may be bare or a q
 
 from __future__ import annotations
 
-from collections.abc import Iterable, Mapping
+from collections.abc import Mapping
 from dataclasses import dataclass
 from pathlib import Path
 from typing import Annotated, Any, Literal, Self
@@ -166,7 +166,6 @@ class _Common(Section):
     master: Settings = {}
     _path: Path = PrivateAttr(default=Path("scenario.toml"))
     _provenance: dict[str, Provenance] = PrivateAttr(default_factory=dict)
-    _notes: tuple[str, ...] = PrivateAttr(default=())
 
     @property
     def name(self) -> str:
@@ -183,14 +182,9 @@ class _Common(Section):
         """Source, reason and unit of every value, by its path."""
         return self._provenance
 
-    @property
-    def notes(self) -> tuple[str, ...]:
-        """What was decided in reading it that its author may not expect, a line each."""
-        return self._notes
-
-    def read_from(self, path: Path, provenance: Mapping[str, Provenance], notes: Iterable[str] = ()) -> Self:
-        """Note the file that the scenario comes from, where each of its values does, and what is to be said; return it."""
-        self._path, self._provenance, self._notes = path, dict(provenance), tuple(notes)
+    def read_from(self, path: Path, provenance: Mapping[str, Provenance]) -> Self:
+        """Note the file that the scenario comes from, and where each of its values does; return it."""
+        self._path, self._provenance = path, dict(provenance)
         return self
 
     def changed(self, options: Settings | None = None, **simulation: Any) -> Self:
@@ -198,7 +192,7 @@ class _Common(Section):
         document = self.model_dump()
         document["simulation"] |= simulation
         document["master"] = document["master"] if options is None else options
-        return type(self).model_validate(document).read_from(self._path, self._provenance, self._notes)
+        return type(self).model_validate(document).read_from(self._path, self._provenance)
 
 
 class LandingScenario(_Common):

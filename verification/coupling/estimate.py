@@ -27,10 +27,9 @@ from scipy.linalg import expm
 from orchestrator.coupling.run.compare import signal_errors
 from orchestrator.coupling.run.results import Table
 from orchestrator.report.plots import BLUE, COLOURS, GREY, MARKERS, STYLE, VERMILION
-from orchestrator.runs.compare import CONSTANT
-from orchestrator.runs.coupled import run_coupled
+from orchestrator.runs.coupled import Coupled, run_coupled
 from orchestrator.runs.estimate import RATIOS, estimate_error
-from orchestrator.runs.record import Coupled
+from orchestrator.runs.result import CONSTANT
 from orchestrator.scenario.read import load
 from orchestrator.scenario.types import Scenario
 from verification.coupling.landings import FOLDER, LANDINGS, OTHERS, scenario, truth

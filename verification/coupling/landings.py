@@ -10,8 +10,7 @@ from orchestrator.coupling.run.compare import communication_times
 from orchestrator.landing.build import problem
 from orchestrator.landing.monolithic.solve import Solution, solve
 from orchestrator.runs.compare import Reference
-from orchestrator.runs.coupled import run_coupled
-from orchestrator.runs.record import Coupled
+from orchestrator.runs.coupled import Coupled, run_coupled
 from orchestrator.runs.reference import solve_reference
 from orchestrator.scenario.read import load
 from orchestrator.scenario.types import Scenario

@@ -14,7 +14,8 @@ import numpy as np
 
 from orchestrator.report.plots import work_precision
 from orchestrator.runs.compare import Comparison, held_against
-from orchestrator.runs.record import Coupled
+from orchestrator.runs.coupled import Coupled
+from orchestrator.runs.summary import result
 from verification.coupling.landings import SIGNALS, coupled, reference
 from verification.study import Result, Row
 
@@ -40,7 +41,7 @@ def comparison() -> Comparison:
     """Run all masters at their macro steps."""
     true = reference(LANDING, tuple(sorted({step for steps in STEPS.values() for step in steps})))
     runs = [coupled(LANDING, master, step) for master, steps in STEPS.items() for step in steps]
-    held = [held_against(run, true) for run in runs if _finished(run)]
+    held = [held_against(result(run), true) for run in runs if _finished(run)]
     held = [run for run in held if all(run.signals[name].relative_max_error < 1.0 for name in SIGNALS)]
     return Comparison(true, held, dict(runs[0].scenario.simulation.tolerances))
 

@@ -8,10 +8,9 @@ import numpy as np
 from scipy.spatial.transform import Rotation
 
 from orchestrator.coupling.run.results import Table
-from orchestrator.landing import build as landing
 from orchestrator.landing.fields import interface_balance
-from orchestrator.runs.coupled import run_coupled
-from orchestrator.runs.record import Coupled
+from orchestrator.landing.resolve import resolve
+from orchestrator.runs.coupled import Coupled, run_coupled
 from orchestrator.scenario.read import load
 from orchestrator.scenario.types import Scenario
 
@@ -48,7 +47,7 @@ def relative_error(signal: str, result: Table, reference: Table) -> float:
 
 def impulse(made: Scenario, table: Table, start: float, stop: float) -> float:
     """Return the vertical impulse of the contact on the robot, N s, from its momentum and its weight."""
-    parameters = landing.parts(made).robot
+    parameters = resolve(made).robot.module
     arm = np.array([float(parameters.get(f"center_of_mass.{axis}", 0.0)) for axis in AXES])
     mass, gravity = float(parameters["mass"]), float(parameters.get("gravity", 9.8))
     places = [int(np.argmin(np.abs(table["time"] - t))) for t in (start, stop)]

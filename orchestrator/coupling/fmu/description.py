@@ -9,6 +9,7 @@ import re
 import tempfile
 import zipfile
 from dataclasses import dataclass
+from functools import lru_cache
 from pathlib import Path
 from typing import Any, Literal
 from xml.etree import ElementTree
@@ -116,13 +117,34 @@ def ports_of(variable: ModelVariable) -> list[Port]:
     return [Port(name, variable.valueReference, *fixed, i) for i, name in enumerate(names)]
 
 
+def parsed(path: Path) -> ModelDescription:
+    """Return FMPy's model description of the file as it now is; each state of a file is read once."""
+    return _parsed(path, *_state(path))
+
+
+def _state(path: Path) -> tuple[int, int]:
+    """Return what changes with the content of a file: the time it was written, ns, and its size."""
+    status = path.stat()
+    return status.st_mtime_ns, status.st_size
+
+
+@lru_cache(maxsize=32)
+def _parsed(path: Path, *state: int) -> ModelDescription:
+    return fmpy.read_model_description(str(path), validate=False)
+
+
+@lru_cache(maxsize=32)
+def _sha256(path: Path, *state: int) -> str:
+    return hashlib.sha256(path.read_bytes()).hexdigest()
+
+
 def read_description(path: Path) -> tuple[ModelDescription, str]:
     """Return model description and SHA-256 of an FMU; `ValueError` says what is wrong with it."""
     if not path.is_file():
         raise ValueError(f"{path}: no such file; build the FMUs, or correct the path")
-    sha256 = hashlib.sha256(path.read_bytes()).hexdigest()
+    sha256 = _sha256(path, *_state(path))
     try:
-        description = fmpy.read_model_description(str(path), validate=False)
+        description = parsed(path)
     except Exception as error:
         raise ValueError(f"{path}: not an FMU ({error})") from error
     if description.coSimulation is None:

@@ -27,7 +27,7 @@ logging.getLogger("fmus").addHandler(logging.NullHandler())  # what our FMUs say
 NOT_FINITE, TIMEOUT = 5, 6
 SHORTER, FORWARD = "; a smaller macro step may help", "; take a master that never goes back, jacobi or gauss_seidel"
 CURES = {DISCARD: SHORTER, NOT_FINITE: SHORTER}
-State = c_void_p
+SavedState = c_void_p
 
 
 class FmuError(Exception):
@@ -315,7 +315,7 @@ class Fmu:
         internal = self.capabilities.internal_step
         return self.capabilities.variable_step and not (internal and abs(h / internal - round(h / internal)) > 1e-6)
 
-    def save(self) -> State:
+    def save(self) -> SavedState:
         """Return a handle on the complete state; to be given to `release` in the end."""
         state = c_void_p()
         status = self.fmi.get_state(state)
@@ -323,13 +323,13 @@ class Fmu:
             raise self.error(max(status, ERROR), "saving the state", FORWARD)
         return state
 
-    def restore(self, state: State) -> None:
+    def restore(self, state: SavedState) -> None:
         """Go back to a saved state (inputs too)."""
         status = self.fmi.set_state(state)
         if status > WARNING:
             raise self.error(max(status, ERROR), "restoring the state", FORWARD)
 
-    def release(self, state: State) -> None:
+    def release(self, state: SavedState) -> None:
         """Free a saved state."""
         self.fmi.free_state(state)
 

@@ -13,7 +13,7 @@ import numpy as np
 from orchestrator.coupling.exchange import suffixed
 from orchestrator.coupling.fmu.binding import ERROR
 from orchestrator.coupling.fmu.description import Port
-from orchestrator.coupling.fmu.instance import Fmu, FmuError, Group, State
+from orchestrator.coupling.fmu.instance import Fmu, FmuError, Group, SavedState
 
 WHOLE = 1e-6  # how far a number of steps may be from a whole one
 RELATIVE = re.compile(r"(^|\.)rotation(\.[xyz])?$")  # counted from the start of the step
@@ -114,19 +114,19 @@ class SubStepped(Fmu):
         self.outputs.get()
         self.given[:] = self.outputs.values
 
-    def save(self) -> State:
+    def save(self) -> SavedState:
         """Return a handle on the complete state; to be given to `release` in the end."""
         state = super().save()
         self.kept[state.value] = self.ended, self.given.copy()
         return state
 
-    def restore(self, state: State) -> None:
+    def restore(self, state: SavedState) -> None:
         """Go back to a saved state (inputs too)."""
         super().restore(state)
         self.ended, given = self.kept[state.value]
         self.given[:] = given
 
-    def release(self, state: State) -> None:
+    def release(self, state: SavedState) -> None:
         """Free a saved state."""
         del self.kept[state.value]
         super().release(state)

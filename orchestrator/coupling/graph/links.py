@@ -12,6 +12,8 @@ from orchestrator.coupling.errors import nearest
 from orchestrator.coupling.fmu.description import Port
 from orchestrator.coupling.fmu.instance import Fmu
 
+Signal = tuple[str, str]
+"""Component and variable."""
 EXPONENTS = ("kg", "m", "s", "A", "K", "mol", "cd", "rad")
 CASTS = {("real", "real"), ("integer", "real"), ("integer", "integer"), ("boolean", "boolean"), ("string", "string")}
 
@@ -27,22 +29,28 @@ class Connection:
     source: str
     target: str
 
+    @classmethod
+    def parse(cls, text: str) -> Connection:
+        """Return the connection that is written as ``a.x -> b.u``; `GraphError` if it is not."""
+        source, arrow, target = (part.strip() for part in text.partition("->"))
+        if not (source and arrow and target):
+            raise GraphError(f'connections: {text!r} is not of the form "a.x -> b.u"')
+        return cls(source, target)
+
 
 @dataclass
 class Link:
     """A checked connection."""
 
-    source: tuple[str, str]
-    target: tuple[str, str]
+    source: Signal
+    target: Signal
     gain: float
     offset: float
     discrete: bool
 
 
-# -- checks -------------------------------------------------------------------------------------------------
-
-
 def checked_links(components: Mapping[str, Fmu], connections: Iterable[Connection]) -> list[Link]:
+    """Return the connections as links; `GraphError` says which cannot be, why, and what to do."""
     links, fed = [], {}
     for connection in connections:
         link = _checked(components, connection)
@@ -58,18 +66,16 @@ def checked_links(components: Mapping[str, Fmu], connections: Iterable[Connectio
 
 def _checked(components: Mapping[str, Fmu], connection: Connection) -> Link:
     where = f"connection {connection.source} → {connection.target}"
-    source, target = (
-        _split(components, connection.source, where),
-        _split(components, connection.target, where),
-    )
-    a, b = components[source[0]].ports[source[1]], components[target[0]].ports[target[1]]
+    source, target = _split(components, connection.source, where), _split(components, connection.target, where)
+    giver, taker = components[source[0]], components[target[0]]
+    a, b = giver.ports[source[1]], taker.ports[target[1]]
     if a.causality != "output":
         raise GraphError(f"{where}: {connection.source} is no output but {a.causality}; connect from an output")
     if b.causality != "input":
         raise GraphError(f"{where}: {connection.target} is no input but {b.causality}; connect to an input")
-    if (a.kind, b.kind) not in CASTS or not _holds(components[target[0]], b, components[source[0]], a):
+    if (a.kind, b.kind) not in CASTS or not _holds(taker, b, giver, a):
         raise GraphError(f"{where}: {a.fmi_type} cannot feed {b.fmi_type}; connect variables of one type")
-    gain, offset = _conversion(components[source[0]], a, components[target[0]], b, where)
+    gain, offset = _conversion(giver, a, taker, b, where)
     discrete = "discrete" in (a.variability, b.variability) or b.kind != "real" or a.kind != "real"
     return Link(source, target, gain, offset, discrete)
 
@@ -81,7 +87,7 @@ def _holds(fmu_b: Fmu, b: Port, fmu_a: Fmu, a: Port) -> bool:
     return np.can_cast(fmu_a.fmi.TYPES[a.fmi_type][1], fmu_b.fmi.TYPES[b.fmi_type][1])
 
 
-def _split(components: Mapping[str, Fmu], signal: str, where: str) -> tuple[str, str]:
+def _split(components: Mapping[str, Fmu], signal: str, where: str) -> Signal:
     component, _, variable = signal.partition(".")
     if component not in components:
         raise GraphError(f"{where}: no component {component!r}{nearest(component, components)}")

@@ -9,10 +9,7 @@ from scipy.sparse import csr_array
 from scipy.sparse.csgraph import connected_components
 
 from orchestrator.coupling.fmu.instance import Fmu
-from orchestrator.coupling.graph.links import Link
-
-# -- order and dependence -----------------------------------------------------------------------------------
-
+from orchestrator.coupling.graph.links import Link, Signal
 
 Dependencies = dict[str, dict[str, frozenset[str] | None]]
 
@@ -81,21 +78,13 @@ def _ranks_within(edges: list[tuple[int, int]], label: np.ndarray, n: int) -> li
 
 def levels(
     links: list[Link],
-    outputs: list[tuple[str, str]],
+    outputs: list[Signal],
     components: Mapping[str, Fmu],
     dependencies: Dependencies,
-) -> tuple[dict[tuple[str, str], int], np.ndarray]:
+) -> tuple[dict[Signal, int], np.ndarray]:
     """Return the stage of every output (0: needs no input) and the places in u of the inputs that are in a
     loop."""
-    place = {signal: i for i, signal in enumerate(outputs)}
-    edges, inputs = [], []
-    for signal in outputs:
-        ports = components[signal[0]].ports
-        deps = dependencies[signal[0]].get(ports[signal[1]].variable)
-        for i, link in enumerate(links):
-            if link.target[0] == signal[0] and (deps is None or ports[link.target[1]].variable in deps):
-                edges.append((place[link.source], place[signal]))
-                inputs.append(i)
+    edges, inputs = _edges(links, outputs, components, dependencies)
     if not edges:
         return dict.fromkeys(outputs, 0), np.array([], dtype=np.intp)
     label = _components_of(edges, len(outputs))
@@ -104,6 +93,25 @@ def levels(
     looped = [label[a] == label[b] for a, b in edges]
     offset = 1 if any(flag and rank[a] == 0 for (a, _), flag in zip(edges, looped, strict=True)) else 0
     fed = {b for _, b in edges}
-    level = {s: rank[i] + (offset if i in fed else 0) for s, i in place.items()}
+    level = {signal: rank[i] + (offset if i in fed else 0) for i, signal in enumerate(outputs)}
     loop = sorted({i for i, flag in zip(inputs, looped, strict=True) if flag})
     return level, np.array(loop, dtype=np.intp)
+
+
+def _edges(
+    links: list[Link], outputs: list[Signal], components: Mapping[str, Fmu], dependencies: Dependencies
+) -> tuple[list[tuple[int, int]], list[int]]:
+    """Return which output depends on which, by their numbers, and for each such pair the place in u it goes through."""
+    place = {signal: i for i, signal in enumerate(outputs)}
+    fed: dict[str, list[int]] = {}
+    for i, link in enumerate(links):
+        fed.setdefault(link.target[0], []).append(i)
+    edges, inputs = [], []
+    for component, name in outputs:
+        ports = components[component].ports
+        deps = dependencies[component].get(ports[name].variable)
+        for i in fed.get(component, []):
+            if deps is None or ports[links[i].target[1]].variable in deps:
+                edges.append((place[links[i].source], place[component, name]))
+                inputs.append(i)
+    return edges, inputs

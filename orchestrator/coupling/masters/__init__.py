@@ -12,7 +12,8 @@ from orchestrator.coupling.masters.jacobi import Jacobi
 from orchestrator.coupling.masters.nepce import Nepce
 from orchestrator.coupling.masters.reduced_interface import ReducedInterface
 from orchestrator.coupling.masters.semi_implicit import SemiImplicit
-from orchestrator.coupling.stepping.master import Master, StepReport
+from orchestrator.coupling.stepping.master import Master
+from orchestrator.coupling.stepping.report import StepReport
 
 MASTERS: dict[str, type[Master]] = {
     "jacobi": Jacobi,

@@ -7,8 +7,9 @@ from typing import Any, ClassVar
 import numpy as np
 
 from orchestrator.coupling.graph.graph import Graph
+from orchestrator.coupling.stepping.accelerator import Accelerator
 from orchestrator.coupling.stepping.bounds import Positive
-from orchestrator.coupling.stepping.implicit import Accelerator, Implicit
+from orchestrator.coupling.stepping.implicit import Implicit
 
 
 class FixedPoint(Implicit):

@@ -7,7 +7,8 @@ from typing import ClassVar
 from orchestrator.coupling.graph.graph import Graph, Node
 from orchestrator.coupling.masters.jacobi import extrapolate
 from orchestrator.coupling.stepping.interpolation import Between, History, Loads, step_node
-from orchestrator.coupling.stepping.master import Master, StepReport
+from orchestrator.coupling.stepping.master import Master
+from orchestrator.coupling.stepping.report import StepReport
 
 
 class GaussSeidel(Master):

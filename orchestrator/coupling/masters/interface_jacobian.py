@@ -8,7 +8,7 @@ from typing import Any, ClassVar
 
 import numpy as np
 
-from orchestrator.coupling.fmu.instance import FmuError, State
+from orchestrator.coupling.fmu.instance import FmuError, SavedState
 from orchestrator.coupling.graph.graph import Graph, Node
 from orchestrator.coupling.graph.links import GraphError
 from orchestrator.coupling.stepping.bounds import Count, NonNegative, Positive, PositiveCount
@@ -16,7 +16,7 @@ from orchestrator.coupling.stepping.implicit import Implicit
 from orchestrator.coupling.stepping.interpolation import Between, step_node
 from orchestrator.coupling.stepping.jacobian import OwnDerivatives
 from orchestrator.coupling.stepping.least_squares import LeastSquares
-from orchestrator.coupling.stepping.master import StepReport
+from orchestrator.coupling.stepping.report import StepReport
 
 WORST = 1e-2  # contraction of the outer iteration that the exactness of the inner one reckons with at most
 SMALLEST = 1e-5  # relative difference of the unknowns below which it says nothing about the Jacobian
@@ -88,7 +88,7 @@ class InterfaceJacobian(Implicit):
             model.jacobians.clear()
         self.contraction = 0.0
 
-    def _begin(self, t: float, H: float, x: np.ndarray, states: list[State]) -> None:
+    def _begin(self, t: float, H: float, x: np.ndarray, states: list[SavedState]) -> None:
         super()._begin(t, H, x, states)
         for model in self.models:
             model.last = None
@@ -96,7 +96,7 @@ class InterfaceJacobian(Implicit):
                 self._differentiate(model, t, H, x, states)
         self.outer, self.last = 0, np.inf
 
-    def _differentiate(self, model: Model, t: float, H: float, x: np.ndarray, states: list[State]) -> None:
+    def _differentiate(self, model: Model, t: float, H: float, x: np.ndarray, states: list[SavedState]) -> None:
         """Make the Jacobian of one component anew, and leave the component where it was."""
         node, state = model.node, states[self.graph.nodes.index(model.node)]
         values = x[model.unknowns]
@@ -113,13 +113,13 @@ class InterfaceJacobian(Implicit):
         node.fmu.restore(state)
         model.jacobians[H] = jacobian
 
-    def _response(self, node: Node, state: State, t: float, H: float, values: np.ndarray) -> np.ndarray:
+    def _response(self, node: Node, state: SavedState, t: float, H: float, values: np.ndarray) -> np.ndarray:
         node.fmu.restore(state)
         node.inputs.values[:] = values
         step_node(self.between, node, t, H)
         return node.outputs.values.copy()
 
-    def _correct(self, t: float, H: float, x: np.ndarray, r: np.ndarray, states: list[State]) -> np.ndarray:
+    def _correct(self, t: float, H: float, x: np.ndarray, r: np.ndarray, states: list[SavedState]) -> np.ndarray:
         """Update the models with what has just been seen, then solve the interface equation with them."""
         for model in self.models:
             model.learn(H, x, self.scale.values)
@@ -158,7 +158,7 @@ class InterfaceJacobian(Implicit):
             self.graph.release(states)
 
     def _solve_interface(
-        self, t: float, H: float, x: np.ndarray, r: np.ndarray, residual: float, states: list[State]
+        self, t: float, H: float, x: np.ndarray, r: np.ndarray, residual: float, states: list[SavedState]
     ) -> tuple[np.ndarray, bool]:
         """Return the unknowns that meet the equation with the models, the best that were found, and whether they do;
         `residual` is the norm of `r`."""
@@ -183,7 +183,7 @@ class InterfaceJacobian(Implicit):
         inner.reject()
         return best[1], False
 
-    def _rest_residual(self, t: float, H: float, x: np.ndarray, states: list[State]) -> np.ndarray:
+    def _rest_residual(self, t: float, H: float, x: np.ndarray, states: list[SavedState]) -> np.ndarray:
         """Return S(x) - x with the modelled components replaced by their models."""
         graph = self.graph
         graph.u[self.places] = x

@@ -6,7 +6,8 @@ from typing import ClassVar
 
 from orchestrator.coupling.graph.graph import Graph, Node
 from orchestrator.coupling.stepping.interpolation import History, Loads
-from orchestrator.coupling.stepping.master import Master, StepReport
+from orchestrator.coupling.stepping.master import Master
+from orchestrator.coupling.stepping.report import StepReport
 
 
 class Jacobi(Master):

@@ -8,7 +8,7 @@ import numpy as np
 
 from orchestrator.coupling.graph.graph import Graph
 from orchestrator.coupling.masters.jacobi import Jacobi
-from orchestrator.coupling.stepping.master import StepReport
+from orchestrator.coupling.stepping.report import StepReport
 
 
 class Nepce(Jacobi):

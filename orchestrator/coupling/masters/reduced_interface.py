@@ -8,14 +8,15 @@ from typing import ClassVar
 
 import numpy as np
 
-from orchestrator.coupling.fmu.instance import Fmu, State
+from orchestrator.coupling.fmu.instance import Fmu, SavedState
 from orchestrator.coupling.graph.graph import Graph, Node
 from orchestrator.coupling.graph.links import GraphError
 from orchestrator.coupling.stepping.bounds import Positive, PositiveCount
 from orchestrator.coupling.stepping.interpolation import Between, Loads, step_node
 from orchestrator.coupling.stepping.least_squares import LeastSquares
-from orchestrator.coupling.stepping.master import Master, StepReport
+from orchestrator.coupling.stepping.master import Master
 from orchestrator.coupling.stepping.replay import check_replay
+from orchestrator.coupling.stepping.report import StepReport
 from orchestrator.coupling.stepping.scale import Scale
 
 
@@ -134,7 +135,7 @@ class ReducedInterface(Master):
         report.residual = best[0]
         return best[1]
 
-    def _residual(self, t: float, H: float, x: np.ndarray, y_hat: np.ndarray, states: list[State]) -> np.ndarray:
+    def _residual(self, t: float, H: float, x: np.ndarray, y_hat: np.ndarray, states: list[SavedState]) -> np.ndarray:
         graph = self.graph
         graph.u[graph.torn] = x
         for node in self.modelled:

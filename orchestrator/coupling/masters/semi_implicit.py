@@ -7,11 +7,12 @@ from typing import Any, ClassVar
 
 import numpy as np
 
-from orchestrator.coupling.fmu.instance import State
+from orchestrator.coupling.fmu.instance import SavedState
 from orchestrator.coupling.graph.graph import Graph
+from orchestrator.coupling.stepping.accelerator import Accelerator
 from orchestrator.coupling.stepping.bounds import Positive, PositiveCount
-from orchestrator.coupling.stepping.implicit import Accelerator, Implicit
-from orchestrator.coupling.stepping.master import StepReport
+from orchestrator.coupling.stepping.implicit import Implicit
+from orchestrator.coupling.stepping.report import StepReport
 
 
 class SemiImplicit(Implicit):
@@ -90,7 +91,7 @@ class SemiImplicit(Implicit):
         return x, self.scale.norm(r, x, H)
 
     def _required(
-        self, t: float, H: float, x: np.ndarray, states: list[State] | None, report: StepReport
+        self, t: float, H: float, x: np.ndarray, states: list[SavedState] | None, report: StepReport
     ) -> np.ndarray:
         """Return the residual; a component that cannot make the step ends the run."""
         r = self._residual(t, H, x, states, report)
@@ -99,7 +100,7 @@ class SemiImplicit(Implicit):
         return r
 
     def _differentiate(
-        self, t: float, H: float, x: np.ndarray, r: np.ndarray, states: list[State], report: StepReport
+        self, t: float, H: float, x: np.ndarray, r: np.ndarray, states: list[SavedState], report: StepReport
     ) -> None:
         steps = self.difference * np.maximum(np.abs(x), 1.0)
         jacobian = np.empty((x.size, x.size))

@@ -10,7 +10,7 @@ import numpy as np
 from orchestrator.coupling.errors import nearest
 from orchestrator.coupling.fmu.instance import FmuError, Group
 from orchestrator.coupling.graph.graph import Graph
-from orchestrator.coupling.stepping.master import StepReport
+from orchestrator.coupling.stepping.report import StepReport
 
 
 @dataclass

@@ -13,7 +13,8 @@ from orchestrator.coupling.fmu.sub_steps import check_steps
 from orchestrator.coupling.graph.graph import Graph
 from orchestrator.coupling.run.log import Log, Recorder
 from orchestrator.coupling.run.work import Work
-from orchestrator.coupling.stepping.master import Master, StepReport
+from orchestrator.coupling.stepping.master import Master
+from orchestrator.coupling.stepping.report import StepReport
 
 DIVIDES = 1e-9  # how far (stop - start)/H may be from a whole number
 

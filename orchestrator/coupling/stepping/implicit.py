@@ -9,18 +9,21 @@ each.
 from __future__ import annotations
 
 from collections.abc import Callable
+from dataclasses import dataclass, replace
 from typing import Any, ClassVar
 
 import numpy as np
 
-from orchestrator.coupling.fmu.instance import ERROR, FmuError, State
+from orchestrator.coupling.fmu.instance import ERROR, FmuError, SavedState
 from orchestrator.coupling.graph.graph import Graph, Node
 from orchestrator.coupling.graph.links import GraphError
+from orchestrator.coupling.stepping.accelerator import Accelerator
 from orchestrator.coupling.stepping.bounds import Count, NonNegative, Positive, PositiveCount
 from orchestrator.coupling.stepping.interpolation import Between, Loads, step_node
-from orchestrator.coupling.stepping.master import Master, StepReport, require_rollback
+from orchestrator.coupling.stepping.master import Master, require_rollback
 from orchestrator.coupling.stepping.predictor import Predictor
 from orchestrator.coupling.stepping.replay import check_replay
+from orchestrator.coupling.stepping.report import StepReport
 from orchestrator.coupling.stepping.scale import Scale
 from orchestrator.coupling.stepping.step_control import StepControl
 
@@ -33,26 +36,13 @@ iterate so wild that nothing near it is an answer."""
 DIVERGED = 1e2  # growth of the unknowns, over accepted ones, prediction and its answer, that ends an iteration
 
 
-class Accelerator:
-    """How the next iterate follows from the present one."""
+@dataclass(frozen=True)
+class Iterate:
+    """The unknowns `x` (n,) that an iteration has come to, and their relative residual."""
 
-    columns = 0
-
-    def begin(self, H: float, scale: np.ndarray) -> None:
-        """Start the iteration of a macro step."""
-
-    def propose(self, x: np.ndarray, r: np.ndarray) -> np.ndarray:
-        """Return the next iterate from the present one and its residual, (n,) each."""
-        raise NotImplementedError
-
-    def accept(self) -> None:
-        """The step has converged: keep what helps the next one."""
-
-    def reject(self) -> None:
-        """The step has not converged: forget what it brought."""
-
-    def reset(self) -> None:
-        """Forget everything."""
+    x: np.ndarray
+    residual: float = np.inf
+    converged: bool = False
 
 
 class Implicit(Master):
@@ -209,71 +199,84 @@ class Implicit(Master):
         self.graph.exchange_discrete()
         states = self.graph.save()
         try:
-            return self._iterate(t, H, x, states, tolerance, report, least=2)[0]
+            return self._iterate(t, H, x, states, tolerance, report, least=2).converged
         finally:
             self.graph.release(states)
 
     def _solve(
-        self, t: float, H: float, states: list[State], report: StepReport, *, keep_best: bool
+        self, t: float, H: float, states: list[SavedState], report: StepReport, *, keep_best: bool
     ) -> tuple[bool, float]:
         """Iterate over one step; return whether it converged and the residual of the iterate the components
         are left at."""
         x = self.predictor.predict(t + H / 2, self.x)
-        converged, residual, x = self._iterate(t, H, x, states, self.tolerance, report)
-        if converged:
-            self.x = x
+        found = self._iterate(t, H, x, states, self.tolerance, report)
+        if found.converged:
+            self.x = found.x
         elif keep_best:
-            self._hold(t, H, x, states, report)
-        return converged, residual
+            self._hold(t, H, found.x, states, report)
+        return found.converged, found.residual
 
     def _iterate(
         self,
         t: float,
         H: float,
         x: np.ndarray,
-        states: list[State],
+        states: list[SavedState],
         tolerance: float,
         report: StepReport,
         least: int = 1,
-    ) -> tuple[bool, float, np.ndarray]:
-        """Iterate from `x` on; return whether it converged, the smallest residual and the unknowns it belongs to."""
+    ) -> Iterate:
+        """Iterate from `x` on, `least` times at least; return the iterate with the smallest residual."""
         self.between.begin()
-        best, limit = (np.inf, x), np.abs(x)
         self._begin(t, H, x, states)
+        found = self._search(t, H, x, states, tolerance, report, least)
+        if found.converged:
+            self.accelerator.accept()
+        else:
+            self.accelerator.reject()
+        return found
+
+    def _search(
+        self,
+        t: float,
+        H: float,
+        x: np.ndarray,
+        states: list[SavedState],
+        tolerance: float,
+        report: StepReport,
+        least: int,
+    ) -> Iterate:
+        """Step, compare, correct, roll back, until the residual is small enough, nothing moves or it runs away."""
+        best, limit = Iterate(x), np.abs(x)
         for k in range(self.max_iterations):
             r = self._residual(t, H, x, states if k else None, report)
             if r is None:
-                break
+                return best
             residual = self.scale.norm(r, x, H)
-            if residual < best[0]:
-                best = (residual, x)
+            if residual < best.residual:
+                best = Iterate(x, residual)
             if residual <= tolerance and k + 1 >= least:
-                self.accelerator.accept()
-                return True, *best
+                return replace(best, converged=True)
             scale = self.scale.values.copy()  # that of x: the correction may try wild unknowns
             if not k:
                 limit = DIVERGED * np.maximum(scale, np.abs(x))
             following = self._correct(t, H, x, r, states)
             if np.max(np.abs(following - x) / scale) <= ROUND_OFF:  # nothing more will come
-                if residual > NOISE:
-                    break
-                self.accelerator.accept()
-                return True, residual, x
+                return Iterate(x, residual, converged=True) if residual <= NOISE else best
             x = following
             if not np.all(np.abs(x) <= limit):
-                break
-        self.accelerator.reject()
-        return False, *best
+                return best
+        return best
 
-    def _begin(self, t: float, H: float, x: np.ndarray, states: list[State]) -> None:
+    def _begin(self, t: float, H: float, x: np.ndarray, states: list[SavedState]) -> None:
         """Prepare for the iteration of a step that starts at the unknowns `x`."""
         self.accelerator.begin(H, self.scale.update(x, H))
 
-    def _correct(self, t: float, H: float, x: np.ndarray, r: np.ndarray, states: list[State]) -> np.ndarray:
+    def _correct(self, t: float, H: float, x: np.ndarray, r: np.ndarray, states: list[SavedState]) -> np.ndarray:
         """Return the next iterate."""
         return self.accelerator.propose(x, r)
 
-    def _hold(self, t: float, H: float, x: np.ndarray, states: list[State], report: StepReport) -> None:
+    def _hold(self, t: float, H: float, x: np.ndarray, states: list[SavedState], report: StepReport) -> None:
         """Last resort: make the step with the best iterate held (the rates of loads zero)."""
         x = x.copy()
         x[np.isin(self.places, self.loads.fed[:, 1])] = 0.0
@@ -282,7 +285,7 @@ class Implicit(Master):
         self.x = x
 
     def _residual(
-        self, t: float, H: float, x: np.ndarray, states: list[State] | None, report: StepReport
+        self, t: float, H: float, x: np.ndarray, states: list[SavedState] | None, report: StepReport
     ) -> np.ndarray | None:
         """Step all components with the unknowns `x`; return S(x) - x, or None if that cannot be done."""
         report.iterations += 1

@@ -7,7 +7,7 @@ from collections import deque
 import numpy as np
 
 from orchestrator.coupling.kernel import kernel
-from orchestrator.coupling.stepping.implicit import Accelerator
+from orchestrator.coupling.stepping.accelerator import Accelerator
 
 
 @kernel

@@ -3,18 +3,14 @@
 from __future__ import annotations
 
 import re
-from typing import TYPE_CHECKING
 
 import numpy as np
 
 from orchestrator.coupling.exchange import suffixed, vectors
 from orchestrator.coupling.graph.graph import Graph, Node
-from orchestrator.coupling.stepping.master import StepReport
-
-if TYPE_CHECKING:
-    from orchestrator.coupling.stepping.implicit import Implicit
-    from orchestrator.coupling.stepping.scale import Scale
-
+from orchestrator.coupling.stepping.loop import Loop
+from orchestrator.coupling.stepping.report import StepReport
+from orchestrator.coupling.stepping.scale import Scale
 
 ORDER = 4  # of the `waveform` exchange; a local error of order 5
 SAFETY = 0.5  # the controller aims at this share of the tolerance
@@ -49,7 +45,7 @@ class StepControl:
     deepest : h is at least H/2^deepest
     """
 
-    def __init__(self, master: Implicit, tolerance: float, absolute: float, deepest: int):
+    def __init__(self, master: Loop, tolerance: float, absolute: float, deepest: int):
         self.master, self.tolerance, self.deepest = master, tolerance, max(deepest, 1)
         self.range = Range(master.graph, absolute)
 

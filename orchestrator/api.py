@@ -1,0 +1,298 @@
+"""The Python interface to the whole: run a scenario, compare masters, read results.
+
+The command line is a thin layer over it. Everything here can be had from `orchestrator` itself:
+
+    import orchestrator
+
+    run = orchestrator.run("landing_200m_point9", set={"robot.parameters.mass": 40.0}, stop=2.0)
+    print(run.verdict, run["robot.roll"].unit, run["robot.roll"].values.max())
+"""
+
+from __future__ import annotations
+
+import json
+from collections.abc import Callable, Iterator, Mapping, Sequence
+from contextlib import contextmanager
+from dataclasses import dataclass, replace
+from pathlib import Path
+from typing import Any
+
+import numpy as np
+
+from orchestrator.coupling.errors import InputError, RunError, nearest
+from orchestrator.coupling.masters.options import master_options
+from orchestrator.runs.compare import Comparison, compared
+from orchestrator.runs.coupled import run_coupled
+from orchestrator.runs.directory import RunDirectory, claimed
+from orchestrator.runs.estimate import estimate_error
+from orchestrator.runs.files import (
+    Draw,
+    load_comparison,
+    load_run,
+    no_pictures,
+    write_comparison,
+    write_run,
+    write_unfinished,
+)
+from orchestrator.runs.reference import solve_reference
+from orchestrator.runs.result import Run, Signal, run_label
+from orchestrator.runs.summary import result
+from orchestrator.runs.systems import System, resolve
+from orchestrator.scenario.read import load
+from orchestrator.scenario.types import Scenario
+
+__all__ = [
+    "Comparison",
+    "InputError",
+    "Run",
+    "RunError",
+    "Signal",
+    "compare",
+    "load_comparison",
+    "load_run",
+    "load_scenario",
+    "run",
+]
+
+Progress = Callable[[str, float, float], None]
+"""Told at every communication point what is being done, the time it has come to, and the time it ends at, s."""
+Out = Path | str | bool | None
+Set = Mapping[str, Any] | Sequence[str]
+"""Other values by their keys; or ``key=value`` in TOML, as on the command line."""
+
+
+class Unfinished(RunError):
+    """A comparison that could not be finished; `runs` were made and are in `directory`."""
+
+    def __init__(self, error: RunError, runs: Sequence[Run], directory: Path):
+        super().__init__(str(error), error.time)
+        self.runs, self.directory = list(runs), directory
+
+
+def run(
+    scenario: Scenario | Path | str,
+    *,
+    set: Set | None = None,
+    robot: str | None = None,
+    master: str | None = None,
+    macro_step: float | None = None,
+    stop: float | None = None,
+    timeout: float | None = None,
+    out: Out = None,
+    estimate: str | None = None,
+    progress: Progress | None = None,
+    pictures: bool = True,
+) -> Run:
+    """Run a scenario coupled.
+
+    Parameters
+    ----------
+    scenario : name of a shipped scenario, path of a scenario file, or one that `load_scenario` has returned
+    set : other values by their keys, ``{"robot.parameters.mass": 12.0}``
+    robot : another robot: a name of the catalogue, or the path of a robot's TOML file or of an FMU
+    master : another master, by its name
+    macro_step : another macro step, s
+    stop : another stop time, s
+    timeout : wall time that one step of an FMU may take, s
+    out : directory to write the results to, which must not exist; True: ``runs/SCENARIO-NNN``; None: nothing is written
+    estimate : by which second run the error is estimated: ``finer``, ``coarser`` or ``none``
+    progress : told how far the run is
+    pictures : whether pictures are drawn into the directory
+
+    Returns
+    -------
+    Run
+        signals, summary, verdict. A run that fails on its way does not raise: its `verdict` is then ``failed`` (after
+        Ctrl-C ``interrupted``), its `error` says why, and its signals end where it did.
+
+    Raises
+    ------
+    InputError : scenario or options are wrong, or `out` exists; nothing was run
+    RunError : the run failed at its very start
+    """
+    loaded = Changes(set, robot, master, macro_step, stop, timeout, estimate).of(scenario)
+    with _directory(out, loaded.name) as directory:
+        found = _run(resolve(loaded), progress or _silent)
+        return found if directory is None else write_run(directory, found, _draw(pictures))
+
+
+def compare(
+    scenario: Scenario | Path | str,
+    *,
+    masters: Sequence[str] | None = None,
+    macro_steps: Sequence[float] | None = None,
+    set: Set | None = None,
+    robot: str | None = None,
+    master: str | None = None,
+    macro_step: float | None = None,
+    stop: float | None = None,
+    timeout: float | None = None,
+    out: Out = None,
+    progress: Progress | None = None,
+    pictures: bool = True,
+) -> Comparison:
+    """Run a scenario coupled and by a reference, the monolithic solver where there is one, and hold them together.
+
+    Parameters
+    ----------
+    masters : names of the masters to compare; None: the scenario's
+    macro_steps : macro steps to compare, s; None: the scenario's
+    set, robot, master, macro_step, stop, timeout, out, progress, pictures : as for `run`
+
+    Returns
+    -------
+    Comparison
+        errors of all signals, verdict, observed orders, and the runs themselves
+
+    Raises
+    ------
+    InputError : scenario or options are wrong, or `out` exists
+    RunError : a run failed at its very start, or the reference did; the runs made so far are written if `out` is given
+    """
+    changes = Changes(set, robot, master, macro_step, stop, timeout)
+    first = changes.of(scenario)
+    variants = _variants(scenario, first, changes, masters, macro_steps)
+    with _directory(out, f"{first.name}-compare") as directory:
+        found = _compared(resolve(first), variants, progress or _silent, directory)
+        return found if directory is None else write_comparison(directory, found, _draw(pictures))
+
+
+def load_scenario(
+    scenario: Path | str,
+    *,
+    set: Set | None = None,
+    robot: str | None = None,
+    master: str | None = None,
+    macro_step: float | None = None,
+    stop: float | None = None,
+    timeout: float | None = None,
+    estimate: str | None = None,
+) -> Scenario:
+    """Read and check a scenario, with other values as for `run`; `InputError` names all that is wrong with it."""
+    return Changes(set, robot, master, macro_step, stop, timeout, estimate).of(scenario)
+
+
+@dataclass(frozen=True)
+class Changes:
+    """What is asked for in the place of a scenario's own values; parameters as for `run`."""
+
+    set: Set | None = None
+    robot: str | None = None
+    master: str | None = None
+    macro_step: float | None = None
+    stop: float | None = None
+    timeout: float | None = None
+    estimate: str | None = None
+
+    def of(self, scenario: Scenario | Path | str) -> Scenario:
+        """Return the scenario with these changes."""
+        if isinstance(scenario, Scenario):
+            return self._on_loaded(scenario)
+        return load(scenario, [*_texts(self._simulation), *_texts(self.set or {})], self.robot, self.master)
+
+    @property
+    def _simulation(self) -> dict[str, Any]:
+        numbers = {"macro_step": self.macro_step, "stop_time": self.stop, "timeout": self.timeout}
+        found: dict[str, Any] = {f"simulation.{key}": float(x) for key, x in numbers.items() if x is not None}
+        return found | ({"simulation.estimate": self.estimate} if self.estimate is not None else {})
+
+    def _on_loaded(self, scenario: Scenario) -> Scenario:
+        if self.set or self.robot:
+            raise InputError(f"{scenario.name}: is loaded already; give `set` and `robot` to load_scenario")
+        simulation = {key.removeprefix("simulation."): value for key, value in self._simulation.items()}
+        if self.master is None or self.master == scenario.simulation.master:
+            return scenario.changed(**simulation)
+        return scenario.changed(_kept_options(scenario, self.master), exchange=None, master=self.master, **simulation)
+
+
+def _kept_options(scenario: Scenario, master: str) -> dict[str, Any]:
+    """Return those options of the scenario's master that are also for another one: the tolerance."""
+    masters = master_options()
+    if master not in masters:
+        raise InputError(f"{scenario.name}: simulation.master: no master {master!r}{nearest(master, masters)}")
+    return {key: value for key, value in scenario.master.items() if key == "tolerance" and key in masters[master]}
+
+
+def _variants(
+    scenario: Scenario | Path | str,
+    first: Scenario,
+    changes: Changes,
+    masters: Sequence[str] | None,
+    macro_steps: Sequence[float] | None,
+) -> list[Scenario]:
+    """Return the scenario for every pair of master and macro step that is asked for, each pair once."""
+    names = dict.fromkeys(masters or [first.simulation.master])
+    steps = dict.fromkeys(macro_steps or [first.simulation.macro_step])
+    return [replace(changes, master=name, macro_step=step).of(scenario) for name in names for step in steps]
+
+
+def _compared(
+    system: System, variants: Sequence[Scenario], progress: Progress, directory: RunDirectory | None
+) -> Comparison:
+    runs: list[Run] = []
+    steps = sorted({variant.simulation.macro_step for variant in variants})
+    try:
+        for variant in variants:
+            runs.append(_run(system.changed(variant.master, **dict(variant.simulation)), progress, estimate=False))
+        reference = solve_reference(system, steps, _told(progress, "reference", system.scenario))
+    except RunError as error:
+        if runs and directory is not None:
+            write_unfinished(directory, runs, str(error))
+            raise Unfinished(error, runs, directory.path) from None
+        raise
+    return compared(runs, reference)
+
+
+def _run(system: System, progress: Progress, estimate: bool = True) -> Run:
+    simulation = system.scenario.simulation
+    label = run_label(simulation.master, simulation.macro_step)
+    coupled = run_coupled(system, _told(progress, label, system.scenario))
+    if estimate:
+        estimate_error(coupled, _told(progress, f"error estimate, {simulation.estimate} run", system.scenario))
+    return result(coupled)
+
+
+def _told(progress: Progress, task: str, scenario: Scenario) -> Callable[[float], None]:
+    return lambda time: progress(task, time, scenario.simulation.stop_time)
+
+
+def _silent(task: str, time: float, stop: float) -> None:
+    """Tell nobody."""
+
+
+@contextmanager
+def _directory(out: Out, name: str) -> Iterator[RunDirectory | None]:
+    """Make the directory of the results, if there is to be one, before anything is run."""
+    if out is None or out is False:
+        yield None
+        return
+    with claimed(None if out is True else out, name) as directory:
+        yield directory
+
+
+def _draw(pictures: bool) -> Draw:
+    if not pictures:
+        return no_pictures
+    from orchestrator.report.page import draw
+
+    return draw
+
+
+def _texts(settings: Set) -> list[str]:
+    """Return `settings` as ``key=value`` in TOML."""
+    if not isinstance(settings, Mapping):
+        return list(settings)
+    return [f"{key}={_toml(value)}" for key, value in settings.items()]
+
+
+def _toml(value: Any) -> str:
+    """Return a value as TOML writes it; NumPy's numbers and arrays too."""
+    if isinstance(value, np.ndarray | np.generic):
+        return _toml(value.tolist())
+    if isinstance(value, bool):
+        return str(value).lower()
+    if isinstance(value, Mapping):
+        return "{ " + ", ".join(f"{json.dumps(str(key))} = {_toml(item)}" for key, item in value.items()) + " }"
+    if isinstance(value, list | tuple):
+        return f"[{', '.join(map(_toml, value))}]"
+    return repr(value) if isinstance(value, int | float) else json.dumps(str(value), ensure_ascii=False)

@@ -1,0 +1,251 @@
+"""A landing resolved: all that a run needs to know of cable, robot, contact and start, found once.
+
+A robot or a cable from elsewhere is placed by the parameters that it shares with our own modules.
+"""
+
+from __future__ import annotations
+
+from collections.abc import Mapping
+from dataclasses import dataclass, field, replace
+from pathlib import Path
+
+import numpy as np
+
+from fmus.cable.module import Cable
+from fmus.contact.module import Contact
+from fmus.module.variables import ModuleError, Value, Variable, VariableTable
+from fmus.robot.module import Robot
+from orchestrator.catalogue import modules as vocabulary
+from orchestrator.catalogue.robot_spec import RobotSpec, load_robot
+from orchestrator.coupling.errors import InputError
+from orchestrator.coupling.fmu.instance import Fmu
+from orchestrator.landing.contract import BREAKS, check_variables
+from orchestrator.landing.placement import Placement, place
+from orchestrator.scenario.types import LandingScenario
+
+Variables = Mapping[str, Variable]
+MOST_WHEELS = 4
+
+
+@dataclass(frozen=True)
+class Sources:
+    """What is read from files.
+
+    Attributes
+    ----------
+    spec : the robot of the catalogue; None for a foreign one
+    variables : of cable, robot and contact, as a foreign FMU's model description or our table has them
+    n_wheels : of the robot
+    mounts : where a foreign robot has its wheels, if it says so by its outputs alone
+    """
+
+    spec: RobotSpec | None
+    variables: Mapping[str, Variables]
+    n_wheels: int
+    mounts: Mapping[str, Value] = field(default_factory=dict)
+
+
+@dataclass(frozen=True)
+class Part:
+    """Cable, robot or contact of a landing.
+
+    Attributes
+    ----------
+    foreign : the FMU that the scenario names; None for one of ours
+    steps : steps that the FMU makes in each step of the master
+    settings : parameters and held inputs that the FMU is given
+    module : those of our module, where it stands for the FMU
+    """
+
+    foreign: Path | None
+    steps: int
+    settings: Mapping[str, Value]
+    module: Mapping[str, Value]
+
+
+@dataclass(frozen=True)
+class Landing:
+    """A landing resolved: graph of FMUs, monolithic problem, estimate and fields are made from this alone.
+
+    Attributes
+    ----------
+    contact : of every wheel; the arc length under it is in `placement`
+    placement : the start of the robot, and the arc length under each wheel
+    """
+
+    scenario: LandingScenario
+    sources: Sources
+    placement: Placement
+    cable: Part
+    robot: Part
+    contact: Part
+
+    @property
+    def n_wheels(self) -> int:
+        """Number of wheels, and of contacts."""
+        return self.sources.n_wheels
+
+    def changed(self, scenario: LandingScenario) -> Landing:
+        """Return the landing of a `scenario` that starts alike: with other steps or other options of the master."""
+        return _landing(scenario, self.sources, self.placement)
+
+
+def resolve(scenario: LandingScenario) -> Landing:
+    """Return the landing of `scenario`: each file is read once, the cable's equilibrium found, the robot placed over it.
+
+    Raises
+    ------
+    InputError : a foreign FMU does not meet its contract, a parameter is out of bounds, the robot has no place
+    """
+    sources = _read(scenario)
+    try:
+        sources = replace(sources, mounts=_mounts(scenario, sources))
+        return _landing(scenario, sources, _placed(scenario, sources))
+    except ModuleError as error:
+        raise InputError(f"{scenario.path}: {error}") from None
+
+
+# -- what is read ---------------------------------------------------------------------------------------------
+
+
+def _read(scenario: LandingScenario) -> Sources:
+    """Read the robot of the catalogue and the descriptions of foreign FMUs, and hold these against their contracts."""
+    foreign = _foreign(scenario)
+    known = {name: vocabulary.of_fmu(path) for name, path in foreign.items()}
+    _require_contract(scenario, foreign, known)
+    model = scenario.robot.model
+    spec = load_robot(model) if model is not None else None
+    n_wheels = spec.n_wheels if spec is not None else _wheels_of(foreign["robot"], known["robot"])
+    tables = {"cable": Cable.table, "robot": Robot(n_wheels).table, "contact": Contact.table}
+    ours = {name: {v.name: v for v in table.variables} for name, table in tables.items()}
+    return Sources(spec, ours | known, n_wheels)
+
+
+def _foreign(scenario: LandingScenario) -> dict[str, Path]:
+    """Return the foreign FMUs of the scenario by component."""
+    files = {"cable": scenario.cable.fmu, "robot": scenario.robot.fmu, "contact": scenario.contact.fmu}
+    return {name: Path(file) for name, file in files.items() if file is not None}
+
+
+def _require_contract(scenario: LandingScenario, foreign: Mapping[str, Path], known: Mapping[str, Variables]) -> None:
+    for kind, path in foreign.items():
+        findings = check_variables(kind, dict(known[kind]))
+        lines = [f"{kind}.fmu: {f.what} is {f.verdict}: {f.note}" for f in findings if f.verdict in BREAKS]
+        if lines:
+            lines.append(f"`orchestrator check {path}` shows the whole contract")
+            raise InputError(f"{scenario.path}: {line}" for line in lines)
+
+
+def _wheels_of(path: Path, known: Variables) -> int:
+    most = MOST_WHEELS + 1
+    n = next((k - 1 for k in range(1, most + 1) if f"wheel[{k}].position.x" not in known), most)
+    if not 1 <= n <= MOST_WHEELS:
+        raise InputError(f"{path}: has {n} wheels (outputs wheel[k].position.*); a landing takes a robot with 1 to 4")
+    return n
+
+
+def _mounts(scenario: LandingScenario, sources: Sources) -> dict[str, Value]:
+    """Return where a foreign robot, initialised for the purpose, has its wheels, if no parameter says it."""
+    wheels = range(1, sources.n_wheels + 1)
+    known = sources.variables["robot"]
+    if scenario.robot.fmu is None or all(f"wheel[{k}].mount.x" in known for k in wheels):
+        return {}
+    fmu = Fmu(scenario.robot.fmu, "robot")
+    try:
+        fmu.set_parameters(scenario.robot.parameters)
+        fmu.enter_initialization(0.0)
+        fmu.exit_initialization()  # many FMUs know their outputs only now
+        return {f"wheel[{k}].mount.{axis}": _arm(fmu, k, axis) for k in wheels for axis in "xyz"}
+    finally:
+        fmu.close()
+
+
+def _arm(fmu: Fmu, k: int, axis: str) -> float:
+    return float(fmu.read(f"wheel[{k}].position.{axis}")) - float(fmu.read(f"body.position.{axis}"))
+
+
+# -- what follows from it -------------------------------------------------------------------------------------
+
+
+def _landing(scenario: LandingScenario, sources: Sources, placement: Placement) -> Landing:
+    robot, known = _robot(scenario, sources), sources.variables["robot"]
+    initial = {name: value for name, value in placement.initial.items() if name in known}
+    settings = dict(scenario.robot.parameters) | initial | scenario.robot.inputs
+    robot = replace(robot, settings=settings, module=dict(robot.module) | placement.initial)
+    return Landing(scenario, sources, placement, _cable(scenario, sources), robot, _contact(scenario, sources))
+
+
+def _cable(scenario: LandingScenario, sources: Sources) -> Part:
+    section, shown = scenario.cable, _shown(scenario.cable.fmu, sources.variables["cable"], Cable.table)
+    return Part(_path(section.fmu), section.steps, section.parameters, shown | section.parameters)
+
+
+def _robot(scenario: LandingScenario, sources: Sources) -> Part:
+    """Return the robot before it is placed."""
+    section, table = scenario.robot, Robot(sources.n_wheels).table
+    shown = _shown(section.fmu, sources.variables["robot"], table)
+    stated = sources.spec.parameters if sources.spec is not None else {}
+    module = shown | stated | section.parameters | section.inputs | dict(sources.mounts)
+    return Part(_path(section.fmu), section.steps, section.parameters | section.inputs, module)
+
+
+def _contact(scenario: LandingScenario, sources: Sources) -> Part:
+    section = scenario.contact
+    stated = sources.spec.contact_parameters if sources.spec is not None else {}
+    settings = stated | section.parameters
+    return Part(_path(section.fmu), 1, settings, settings)
+
+
+def _path(file: str | None) -> Path | None:
+    return Path(file) if file is not None else None
+
+
+def _shown(file: str | None, known: Variables, table: VariableTable) -> dict[str, Value]:
+    """Return the start values of those parameters of a foreign FMU that `table` has as well."""
+    if file is None:
+        return {}
+    shared = [n for n in table.names("parameter") if n in known and known[n].start != "" and n != "n_wheels"]
+    return {name: known[name].start for name in shared}
+
+
+def _placed(scenario: LandingScenario, sources: Sources) -> Placement:
+    """Return the start of the robot over the cable at rest."""
+    cable = cable_module(_cable(scenario, sources))
+    robot = robot_module(_robot(scenario, sources), sources.n_wheels)
+    contact = contact_module(_contact(scenario, sources), 0.0)
+    contact.check_parameters()
+    landing = scenario.landing
+    placement = place(cable, robot, contact, landing.position, landing.height, landing.velocity)
+    if scenario.robot.fmu is None:
+        robot.table.assign(robot.values, placement.initial)
+        robot.initialize(0.0)  # its mass and inertia are looked at before anything is run
+    return placement
+
+
+# -- our modules ----------------------------------------------------------------------------------------------
+
+
+def cable_module(part: Part) -> Cable:
+    """Return our cable with the parameters of `part`, at rest."""
+    cable = Cable()
+    _assign(cable.table, cable.values, part.module)
+    cable.initialize(0.0)
+    return cable
+
+
+def robot_module(part: Part, n_wheels: int) -> Robot:
+    """Return our robot with the parameters of `part`; it is not initialised."""
+    robot = Robot(n_wheels)
+    _assign(robot.table, robot.values, part.module)
+    return robot
+
+
+def contact_module(part: Part, s: float) -> Contact:
+    """Return our contact with the parameters of `part` at arc length `s` (m)."""
+    contact = Contact()
+    _assign(contact.table, contact.values, {**part.module, "initial.s": s})
+    return contact
+
+
+def _assign(table: VariableTable, values: np.ndarray, settings: Mapping[str, Value]) -> None:
+    table.assign(values, {name: value for name, value in settings.items() if name in table.index})

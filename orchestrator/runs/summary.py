@@ -1,0 +1,94 @@
+"""From a finished coupled run to what is kept of it."""
+
+from __future__ import annotations
+
+from collections.abc import Mapping
+from typing import Any
+
+import numpy as np
+
+from orchestrator.coupling.run.interrupt import Interruption
+from orchestrator.coupling.run.results import plain
+from orchestrator.landing.fields import interface_balance
+from orchestrator.runs.coupled import Coupled
+from orchestrator.runs.result import Run, Verdict
+from orchestrator.scenario.types import Scenario
+
+
+def result(coupled: Coupled) -> Run:
+    """Return the result of a coupled run, not yet written."""
+    error = coupled.log.error
+    content = {"complete": error is None, "error": None if error is None else str(error)}
+    content |= manifest(coupled.scenario, coupled.fmus)
+    return Run(coupled.table, coupled.steps_table, coupled.fields, plain(summary(coupled)), plain(content))
+
+
+def manifest(scenario: Scenario, fmus: Mapping[str, Any]) -> dict[str, Any]:
+    """Return what a run depends on: the resolved scenario, the source of each value, the FMUs."""
+    return {
+        "scenario": str(scenario.path),
+        "resolved": scenario.model_dump(exclude_none=True),
+        "provenance": dict(scenario.provenance),
+        "fmus": fmus,
+    }
+
+
+def summary(coupled: Coupled) -> dict[str, Any]:
+    """Return what ``summary.json`` holds: verdict, cost, convergence, extremes of the signals, interface work."""
+    log, scenario, about = coupled.log, coupled.scenario, coupled.system.about(coupled.table)
+    return {
+        "scenario": scenario.name,
+        "title": scenario.title,
+        "verdict": verdict(coupled),
+        **about,
+        "master": coupled.master,
+        "exchange": coupled.exchange or None,
+        "exchange_asked": coupled.system.exchange or coupled.exchange or None,
+        "macro_step": log.macro_step,
+        **_cost(coupled),
+        "left_the_groove": coupled.fallen,
+        "energy": coupled.energy.content() if coupled.energy is not None else about["energy"],
+        "interface_work_J": {name: float(work[-1]) for name, work in log.energy.items()},
+        "energy_residual_J": {name: float(np.max(np.abs(r))) for name, r in log.energy_residual.items()},
+        "tolerances": scenario.simulation.tolerances,
+        "estimate": scenario.simulation.estimate,
+        "estimated_error": coupled.estimated_error,
+        "estimate_failure": coupled.estimate_failure,
+        "interface_balance": interface_balance(coupled.table, log.energy),
+        "units": {"time": "s", **coupled.units},
+        "extremes": {n: _extremes(log.time, values) for n, values in coupled.table.items() if n != "time"},
+    }
+
+
+def verdict(coupled: Coupled) -> Verdict:
+    """Return how a run ended; what it means stands at `Run.verdict`."""
+    if coupled.log.error is not None:
+        return "interrupted" if isinstance(coupled.log.error, Interruption) else "failed"
+    return "missed" if coupled.log.unconverged or coupled.fallen else "within"
+
+
+def _cost(coupled: Coupled) -> dict[str, Any]:
+    log = coupled.log
+    simulated = float(log.time[-1] - log.time[0])
+    return {
+        "simulated_s": simulated,
+        "wall_s": log.wall,
+        "wall_per_simulated_s": log.wall / simulated if simulated > 0.0 else None,
+        "wall_components_s": log.wall_components,
+        "steps": len(log.steps),
+        "solves": log.solves,
+        "iterations_per_step": log.iterations_per_step,
+        "unconverged_steps": log.unconverged,
+    }
+
+
+def _extremes(time: np.ndarray, values: np.ndarray) -> dict[str, float]:
+    low, high = int(np.argmin(values)), int(np.argmax(values))
+    pairs = {
+        "start": values[0],
+        "end": values[-1],
+        "min": values[low],
+        "min_time": time[low],
+        "max": values[high],
+    }
+    return {name: float(value) for name, value in {**pairs, "max_time": time[high]}.items()}
