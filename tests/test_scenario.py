@@ -3,7 +3,6 @@
 import hashlib
 import json
 import math
-import warnings
 from pathlib import Path
 
 import pytest
@@ -11,7 +10,7 @@ import pytest
 from orchestrator.catalogue.new import write_new
 from orchestrator.catalogue.robot_spec import load_robot
 from orchestrator.catalogue.scenarios import find
-from orchestrator.coupling.errors import InputError, Notice
+from orchestrator.coupling.errors import InputError
 from orchestrator.scenario.read import load
 from orchestrator.scenario.types import GraphScenario, LandingScenario
 
@@ -90,8 +89,7 @@ def test_overrides_have_toml_types_and_their_own_provenance(file: Path):
 def test_another_robot_and_another_master(file: Path):
     text = GOOD.replace("[cable", 'exchange = "hermite"\n[master]\ntolerance = 1e-6\n[cable', 1)
     file.write_text(text, encoding="utf-8")
-    with pytest.warns(Notice, match="inertia.xx"):
-        scenario = load(file, robot="hybrid_robot_2", master="jacobi")
+    scenario = load(file, robot="hybrid_robot_2", master="jacobi")
     assert isinstance(scenario, LandingScenario) and scenario.robot.model == "hybrid_robot_2"
     assert scenario.master == {} and scenario.simulation.exchange is None
 
@@ -319,19 +317,16 @@ def test_paths_are_relative_to_the_file_in_which_they_stand(file: Path):
 
 
 def test_another_robot_does_not_get_the_parameters_of_the_first(file: Path):
-    with pytest.warns(Notice, match=r"^robot: parameters.inertia.xx are fptlir's and not taken over for another$"):
-        scenario = load(
-            child(file, 'extends = "a.toml"\n[robot]\nmodel = "hybrid_robot_2"\nparameters.initial.yaw = 0.1')
-        )
+    scenario = load(child(file, 'extends = "a.toml"\n[robot]\nmodel = "hybrid_robot_2"\nparameters.initial.yaw = 0.1'))
     assert isinstance(scenario, LandingScenario) and scenario.robot.parameters == {"initial.yaw": 0.1}
+    assert scenario.notes == ("robot: parameters.inertia.xx are fptlir's and not taken over for another",)
     same = load(child(file, 'extends = "a.toml"\n[robot]\nmodel = "fptlir"\nparameters.initial.yaw = 0.1'))
     assert isinstance(same, LandingScenario) and same.robot.parameters == {"inertia.xx": 6.0, "initial.yaw": 0.1}
 
 
 def test_another_robot_of_the_command_line_neither(file: Path):
-    with pytest.warns(Notice, match="parameters.inertia.xx"):
-        scenario = load(file, robot="hybrid_robot_2")
-    assert isinstance(scenario, LandingScenario) and scenario.robot.parameters == {}
+    scenario = load(file, robot="hybrid_robot_2")
+    assert isinstance(scenario, LandingScenario) and scenario.robot.parameters == {} and len(scenario.notes) == 1
     assert load(file, robot="fptlir").model_dump() == load(file).model_dump()
 
 
@@ -397,9 +392,7 @@ def test_scenarios_are_found_by_name_and_by_path(tmp_path: Path, monkeypatch: py
     ],
 )
 def test_any_unit_that_converts_exactly(file: Path, override: str, key: str, value: float):
-    replaced(file, "parameters.inertia.xx = 6.0", "parameters.gravity = 9.81")
-    with warnings.catch_warnings(action="ignore", category=Notice):
-        scenario = load(file, [override])
+    scenario = load(file, [override])
     assert flat(scenario.model_dump())[key] == value
     provenance = scenario.provenance[key]
     assert provenance.source == "command line" and provenance.unit is not None
@@ -422,8 +415,7 @@ def test_units_that_do_not_fit(file: Path, override: str, message: str):
 
 
 def test_a_source_of_the_command_line_is_kept(file: Path):
-    with pytest.warns(Notice, match="not scaled"):
-        scenario = load(file, ['robot.parameters.mass={value=40.0,unit="kg",source="scales"}'])
+    scenario = load(file, ['robot.parameters.mass={value=40.0,unit="kg",source="scales"}'])
     assert scenario.provenance["robot.parameters.mass"].source == "scales"
 
 
@@ -432,28 +424,30 @@ def test_a_source_of_the_command_line_is_kept(file: Path):
 
 def test_inertia_goes_with_an_overridden_mass(file: Path):
     replaced(file, "parameters.inertia.xx = 6.0", "")
-    with pytest.warns(Notice, match=r"^robot.parameters.mass: inertia scaled by 1.447 with the mass$"):
-        scenario = load(file, ["robot.parameters.mass=55.0"])
+    scenario = load(file, ["robot.parameters.mass=55.0"])
     assert isinstance(scenario, LandingScenario)
     ours, spec = scenario.robot.parameters, load_robot("fptlir").parameters
     for axes in ("xx", "yy", "zz", "xy", "xz", "yz"):
         assert ours[f"inertia.{axes}"] == pytest.approx(spec[f"inertia.{axes}"] * 55 / 38, rel=1e-15)
+    assert scenario.notes == ("robot.parameters.mass: inertia scaled by 1.447 with the mass",)
     assert scenario.provenance["robot.parameters.inertia.zz"].reason == "inertia scaled by 1.447 with the mass"
     heavier = load_robot("fptlir_55kg").parameters
     assert ours["inertia.zz"] == pytest.approx(heavier["inertia.zz"], rel=1e-15)
 
 
 def test_inertia_that_is_given_is_not_touched(file: Path):
-    with pytest.warns(Notice, match="the inertia is not scaled with the mass, since inertia.xx is given"):
-        scenario = load(file, ["robot.parameters.mass=55.0"])
+    scenario = load(file, ["robot.parameters.mass=55.0"])
     assert isinstance(scenario, LandingScenario) and scenario.robot.parameters == {"inertia.xx": 6.0, "mass": 55.0}
+    (note,) = scenario.notes
+    assert "the inertia is not scaled with the mass, since inertia.xx is given" in note
 
 
 def test_nothing_is_scaled_for_the_robot_s_own_mass(file: Path):
     replaced(file, "parameters.inertia.xx = 6.0", "")
-    with warnings.catch_warnings(action="error"):
-        scenario = load(file, ["robot.parameters.mass=38.0"])
-    assert isinstance(scenario, LandingScenario) and scenario.robot.parameters == {"mass": 38.0}
+    scenario = load(file, ["robot.parameters.mass=38.0"])
+    assert (
+        isinstance(scenario, LandingScenario) and scenario.robot.parameters == {"mass": 38.0} and scenario.notes == ()
+    )
 
 
 # -- a robot of one's own ----------------------------------------------------------------------------------------

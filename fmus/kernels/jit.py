@@ -22,13 +22,18 @@ from typing import Any
 
 import numba
 
+from fmus.kernels import compilation
 from fmus.kernels.cache import prune, remove, used, user_folder
 
+if __name__ == "fmus.kernels.jit":  # not the copy within an FMU
+    compilation.watch()
 LIBRARIES = {*sys.stdlib_module_names, "numba", "numpy", "scipy", "llvmlite"}
 """What is not looked into: their versions, not their sources, decide over the compiled code."""
 IMPORT = re.compile(
     r"^[ \t]*(?:from[ \t]+([\w.]+)[ \t]+import[ \t]+(\([^)]*\)|[^\n#]*)|import[ \t]+([^\n#]+))", re.MULTILINE
 )
+
+_folders: dict[str, Path] = {}
 
 
 def kernel(function: Callable) -> Callable:
@@ -79,7 +84,14 @@ def code_folder(module: str) -> Path:
     if not folder.is_dir():  # Numba makes it when there is something to keep
         prune(parent)
         _remove_former(parent)
-    return used(folder)
+    _folders[module] = used(folder)
+    return folder
+
+
+def is_compiled(package: str) -> bool:
+    """Say whether there is compiled code for every file with kernels of `package` that has been imported."""
+    folders = [folder for module, folder in _folders.items() if module.startswith(f"{package}.")]
+    return all(any(folder.glob("*/*.nbi")) for folder in folders)
 
 
 def _remove_former(parent: Path) -> None:

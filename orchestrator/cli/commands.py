@@ -8,6 +8,7 @@ from __future__ import annotations
 
 import os
 import sys
+import warnings
 from pathlib import Path
 from typing import Annotated, Any
 
@@ -24,7 +25,6 @@ from orchestrator.cli.printing import (
     print_run,
     print_table,
     progress_bars,
-    show_notices,
 )
 from orchestrator.coupling.errors import DONE, FAILED, INTERRUPTED, MISSED, InputError, OrchestratorError
 
@@ -34,7 +34,7 @@ class Commands(TyperGroup):
 
     def invoke(self, ctx: Any) -> Any:
         """Carry out one command."""
-        show_notices()
+        warnings.showwarning = lambda message, *_: complain(str(message))
         try:
             return super().invoke(ctx)
         except OrchestratorError as error:
@@ -63,7 +63,9 @@ app = typer.Typer(
 
 app.add_typer(new.app, name="new")
 
-ScenarioFile = Annotated[str, typer.Argument(metavar="SCENARIO", help="Name of a shipped scenario, or a TOML file.")]
+ScenarioFile = Annotated[
+    str, typer.Argument(metavar="SCENARIO", help="A shipped scenario's name, or a scenario file (TOML).")
+]
 Out = Annotated[
     Path | None, typer.Option(help="Directory of the results; it must not exist. Default: runs/SCENARIO-NNN.")
 ]
@@ -119,6 +121,8 @@ def validate(scenario: ScenarioFile, robot: Robot = None, set_: Set = None) -> N
     from orchestrator.runs.components import master_of, opened
 
     loaded = load_scenario(scenario, set=set_, robot=robot)
+    for note in loaded.notes:
+        complain(note)
     with opened(loaded) as graph:
         master_of(loaded, graph)
         print(f"{scenario}: valid; {len(graph.components)} FMUs, {len(list(graph.connections))} connections")

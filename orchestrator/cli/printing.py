@@ -3,20 +3,19 @@
 from __future__ import annotations
 
 import sys
-import warnings
-from collections.abc import Callable, Iterable, Iterator
+from collections.abc import Callable, Iterator, Sequence
 from contextlib import contextmanager
-from typing import TYPE_CHECKING, Any
-
-from orchestrator.coupling.errors import Notice
+from typing import TYPE_CHECKING
 
 if TYPE_CHECKING:
     from orchestrator.runs.compare import Comparison
     from orchestrator.runs.result import Run
 
 
-def complain_of(runs: Iterable[Run]) -> None:
-    """Say on stderr what went wrong in `runs`."""
+def complain_of(runs: Sequence[Run]) -> None:
+    """Say on stderr what is to be known of `runs`, and what went wrong in them."""
+    for note in dict.fromkeys(note for run in runs for note in run.notes):
+        complain(note)
     for run in runs:
         for line in run.warnings:
             complain(f"{run.label}: {line}")
@@ -136,16 +135,3 @@ def progress_bars(quiet: bool) -> Iterator[Callable[[str, float, float], None]]:
 
 def complain(message: str) -> None:
     print(f"orchestrator: {message}", file=sys.stderr)
-
-
-def show_notices() -> None:
-    """Let notices appear as complaints do; other warnings stay as they are."""
-    others = warnings.showwarning
-
-    def show(message: Warning | str, category: type[Warning], *where: Any) -> None:
-        if issubclass(category, Notice):
-            complain(str(message))
-        else:
-            others(message, category, *where)
-
-    warnings.showwarning = show

@@ -40,10 +40,6 @@ class RunError(OrchestratorError):
         super().__init__(message)
 
 
-class Notice(UserWarning):
-    """What was decided for the user, who may not expect it: shown once, and nothing is wrong."""
-
-
 def nearest(name: str, known: Iterable[str]) -> str:
     """Return ``; did you mean mass?`` for the known name nearest to `name`, or an empty string."""
     close = get_close_matches(name, list(known), n=1, cutoff=0.5)

@@ -14,7 +14,7 @@ from fmus.module.variables import Causality, Variable
 from orchestrator.catalogue import modules as vocabulary
 from orchestrator.coupling.errors import InputError
 
-Verdict = Literal["ok", "missing", "wrong", "advice"]
+Standing = Literal["ok", "missing", "wrong", "advice"]
 
 
 @dataclass(frozen=True)
@@ -137,7 +137,7 @@ class Finding:
     """One line of the answer: what was looked at, how it stands, and why."""
 
     what: str
-    verdict: Verdict
+    verdict: Standing
     note: str = ""
 
 
@@ -221,5 +221,5 @@ def _capabilities(path: Path, description: Any) -> list[Finding]:
     ]
 
 
-def _advised(given: bool, why: str) -> tuple[Verdict, str]:
+def _advised(given: bool, why: str) -> tuple[Standing, str]:
     return ("ok", "") if given else ("advice", f"no: {why}")

@@ -18,7 +18,7 @@ from orchestrator.coupling.errors import OrchestratorError
 from orchestrator.coupling.masters import MASTERS
 from orchestrator.coupling.masters.options import master_options
 from orchestrator.coupling.run.compare import largest_difference
-from orchestrator.runs.coupled import Coupled, Progress, completed
+from orchestrator.runs.coupled import Coupled, Reached, completed
 from orchestrator.runs.systems import System
 from orchestrator.scenario.types import Scenario
 
@@ -61,7 +61,7 @@ def _options(scenario: Scenario, ratio: float) -> dict[str, Any]:
     return dict(scenario.master) | {n: all_options[n] * change for n, change in by.items() if all_options.get(n)}
 
 
-def estimate_error(coupled: Coupled, progress: Progress = lambda _: None) -> Coupled | None:
+def estimate_error(coupled: Coupled, progress: Reached = lambda _: None) -> Coupled | None:
     """Estimate the error of a finished run by a second one, and note it in `coupled`; a failure is noted, not raised.
 
     Returns

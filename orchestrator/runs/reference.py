@@ -18,7 +18,7 @@ from orchestrator.landing import monolithic
 from orchestrator.landing.monolithic import Problem
 from orchestrator.runs.compare import Reference
 from orchestrator.runs.components import only_couples
-from orchestrator.runs.coupled import Progress, completed
+from orchestrator.runs.coupled import Reached, completed
 from orchestrator.runs.systems import System, resolve
 from orchestrator.scenario.types import DEFAULT_MASTER, Scenario
 
@@ -27,7 +27,7 @@ TIGHTER = 1e-2
 
 
 def solve_reference(
-    system: System | Scenario, macro_steps: Iterable[float], progress: Progress = lambda _: None
+    system: System | Scenario, macro_steps: Iterable[float], progress: Reached = lambda _: None
 ) -> Reference:
     """Return the reference at the communication points of all `macro_steps`; a scenario is resolved first."""
     if isinstance(system, Scenario):
@@ -41,7 +41,7 @@ def solve_reference(
 
 
 def _monolithic_reference(
-    system: System, problem: Callable[[], Problem], times: np.ndarray, progress: Progress
+    system: System, problem: Callable[[], Problem], times: np.ndarray, progress: Reached
 ) -> Reference:
     try:
         solution = monolithic.solve(problem, times, progress=progress)
@@ -54,7 +54,7 @@ def _monolithic_reference(
     return Reference("monolithic", table, solution.wall_s, estimates, fields)
 
 
-def _fine_reference(system: System, macro_steps: list[float], progress: Progress) -> Reference:
+def _fine_reference(system: System, macro_steps: list[float], progress: Reached) -> Reference:
     """Return the same graph at a much smaller macro step; its error is taken from one twice as large."""
     common, own = common_divisor(macro_steps), system.scenario.master
     try:

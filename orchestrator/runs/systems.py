@@ -19,7 +19,7 @@ from orchestrator.coupling.graph.links import Connection
 from orchestrator.coupling.masters import MASTERS
 from orchestrator.coupling.run.results import Table
 from orchestrator.landing import audit
-from orchestrator.landing import build as modules
+from orchestrator.landing.build import has_monolithic, problem
 from orchestrator.landing.fields import cable_fields
 from orchestrator.landing.monolithic import Problem
 from orchestrator.landing.resolve import Landing, Variables
@@ -94,7 +94,7 @@ class LandingSystem:
 
     def problem(self) -> Callable[[], Problem] | None:
         """Return what makes the monolithic problem; None where our modules cannot stand for a foreign FMU."""
-        return (lambda: modules.problem(self.landing)) if modules.has_monolithic(self.landing) else None
+        return (lambda: problem(self.landing)) if has_monolithic(self.landing) else None
 
     def split(self, table: Table) -> tuple[Fields, Table]:
         """Return the cable's shape and tension over time as arrays, and the table without them."""

@@ -3,7 +3,6 @@
 from __future__ import annotations
 
 import hashlib
-import warnings
 from collections.abc import Iterable, Iterator
 from dataclasses import replace
 from pathlib import Path
@@ -14,7 +13,7 @@ from orchestrator.catalogue import robot_spec
 from orchestrator.catalogue.documents import Document, Stack, is_quantity
 from orchestrator.catalogue.quantities import Complaint, complaints, quantity_complaints
 from orchestrator.catalogue.scenarios import find
-from orchestrator.coupling.errors import InputError, Notice
+from orchestrator.coupling.errors import InputError
 from orchestrator.scenario import layers
 from orchestrator.scenario.check import check, known_variables, to_si
 from orchestrator.scenario.inertia import scale_inertia
@@ -29,8 +28,6 @@ def load(
     path: Path | str, overrides: Iterable[str] = (), robot: str | None = None, master: str | None = None
 ) -> Scenario:
     """Read, check and return a scenario; raise `InputError` with all problems at once.
-
-    What its author may not expect (an inertia that goes with the mass) is a warning of the class `Notice`.
 
     Parameters
     ----------
@@ -59,9 +56,7 @@ def load(
     problems += [*invalid, *check(plain, known)]
     if problems or scenario is None:
         raise InputError(f"{stack.place_of(problem.path)}: {problem}" for problem in problems)
-    for note in notes:
-        warnings.warn(note, Notice, stacklevel=2)
-    return scenario.read_from(path, _with_robot_file(plain, provenance))
+    return scenario.read_from(path, _with_robot_file(plain, provenance), notes)
 
 
 def _unwrap(

@@ -7,7 +7,7 @@ FMUs (``[components.NAME]`` and ``connections``). Every value may be bare or a q
 
 from __future__ import annotations
 
-from collections.abc import Mapping
+from collections.abc import Iterable, Mapping
 from dataclasses import dataclass
 from pathlib import Path
 from typing import Annotated, Any, Literal, Self
@@ -25,6 +25,10 @@ from orchestrator.catalogue import modules as vocabulary
 from orchestrator.catalogue.quantities import Scalar
 
 DEFAULT_MASTER = "iqn_ils"
+
+
+class ScenarioNote(UserWarning):
+    """What was decided in reading a scenario that its author may not expect."""
 
 
 class Section(BaseModel):
@@ -106,7 +110,7 @@ class ContactSection(Section):
     parameters: Settings = {}
 
 
-class Landing(Section):
+class LandingSection(Section):
     """Where and how the robot comes down.
 
     Attributes
@@ -166,6 +170,7 @@ class _Common(Section):
     master: Settings = {}
     _path: Path = PrivateAttr(default=Path("scenario.toml"))
     _provenance: dict[str, Provenance] = PrivateAttr(default_factory=dict)
+    _notes: tuple[str, ...] = PrivateAttr(default=())
 
     @property
     def name(self) -> str:
@@ -182,9 +187,14 @@ class _Common(Section):
         """Source, reason and unit of every value, by its path."""
         return self._provenance
 
-    def read_from(self, path: Path, provenance: Mapping[str, Provenance]) -> Self:
-        """Note the file that the scenario comes from, and where each of its values does; return it."""
-        self._path, self._provenance = path, dict(provenance)
+    @property
+    def notes(self) -> tuple[str, ...]:
+        """What was decided in reading it that its author may not expect, a line each."""
+        return self._notes
+
+    def read_from(self, path: Path, provenance: Mapping[str, Provenance], notes: Iterable[str] = ()) -> Self:
+        """Note the file that the scenario comes from, where each of its values does, and what is to be said; return it."""
+        self._path, self._provenance, self._notes = path, dict(provenance), tuple(notes)
         return self
 
     def changed(self, options: Settings | None = None, **simulation: Any) -> Self:
@@ -192,7 +202,7 @@ class _Common(Section):
         document = self.model_dump()
         document["simulation"] |= simulation
         document["master"] = document["master"] if options is None else options
-        return type(self).model_validate(document).read_from(self._path, self._provenance)
+        return type(self).model_validate(document).read_from(self._path, self._provenance, self._notes)
 
 
 class LandingScenario(_Common):
@@ -201,7 +211,7 @@ class LandingScenario(_Common):
     cable: CableSection
     robot: RobotSection
     contact: ContactSection = ContactSection()
-    landing: Landing
+    landing: LandingSection
 
 
 class GraphScenario(_Common):
@@ -217,7 +227,7 @@ Scenario = LandingScenario | GraphScenario
 
 UNITS = {
     f"{section}.{name}": marker.unit
-    for section, model in (("simulation", Simulation), ("landing", Landing))
+    for section, model in (("simulation", Simulation), ("landing", LandingSection))
     for name, field in model.model_fields.items()
     for marker in field.metadata
     if isinstance(marker, In)
