@@ -17,6 +17,7 @@ from fmus.kernels.time_integration import collocation
 from fmus.module.variables import ModuleError
 from fmus.robot import rigid_body
 from fmus.robot.module import Robot, body_parameters, initial_state
+from orchestrator.coupling.exchange import only_couples
 from orchestrator.landing.monolithic import system as kernels
 from orchestrator.landing.monolithic.system import N_CONTACT, N_ROBOT, State, System
 
@@ -127,8 +128,6 @@ def _control(robot: Robot, n_wheels: int) -> np.ndarray:
 class _Recorder:
     """Writes the modules' own outputs at the output times."""
 
-    SKIP = ("_mean.", ".work", ".rotation", "_rate.")
-
     def __init__(self, integrator: Integrator, n: int):
         self.integrator = integrator
         problem = integrator.problem
@@ -149,7 +148,7 @@ class _Recorder:
         self._angles = self._robot_state[rigid_body.ANGLES : rigid_body.ANGLES + 3]
 
     def _names(self, names: Sequence[str]) -> list[str]:
-        return [name for name in names if not any(part in name for part in self.SKIP)]
+        return [name for name in names if not (only_couples(name) or ".work" in name)]
 
     def record(self, i: int) -> None:
         """Write row `i` from the present state."""
