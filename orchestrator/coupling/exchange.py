@@ -134,6 +134,12 @@ def is_load(name: str, names: Container[str]) -> bool:
     return suffixed(name, RATE) in names and not is_motion(name, names)
 
 
+def is_rate_of_motion(name: str, names: Container[str]) -> bool:
+    """Return whether one of `names` is the rate of a motion: a value at an instant, no slope over the step."""
+    place, last, axis = split(name)
+    return last.endswith(RATE) and is_motion(f"{place}{last.removesuffix(RATE)}{axis}", names)
+
+
 def is_from_start(name: str) -> bool:
     """Return whether `name` is that of a motion counted from the start of the macro step."""
     return split(name)[1] in FROM_START
