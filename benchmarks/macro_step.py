@@ -15,7 +15,8 @@ from pathlib import Path
 from time import perf_counter
 from typing import Any
 
-from orchestrator.coupling.fmu.instance import Fmu, Group
+from orchestrator.coupling.fmu.group import Group
+from orchestrator.coupling.fmu.instance import Fmu
 from orchestrator.runs.coupled import run_coupled
 from orchestrator.scenario.read import load
 

@@ -11,6 +11,7 @@ The command line is a thin layer over it. Everything here can be had from `orche
 from __future__ import annotations
 
 import json
+import warnings
 from collections.abc import Callable, Iterator, Mapping, Sequence
 from contextlib import contextmanager
 from dataclasses import dataclass, replace
@@ -41,7 +42,7 @@ from orchestrator.runs.result import Run, Signal, run_label
 from orchestrator.runs.summary import result
 from orchestrator.runs.systems import System, resolve
 from orchestrator.scenario.read import load
-from orchestrator.scenario.types import LandingScenario, Scenario
+from orchestrator.scenario.types import LandingScenario, Scenario, ScenarioNote
 
 __all__ = [
     "Comparison",
@@ -190,7 +191,10 @@ class Changes:
         """Return the scenario with these changes."""
         if isinstance(scenario, Scenario):
             return self._on_loaded(scenario)
-        return load(_found(scenario), [*_texts(self._simulation), *_texts(self.set or {})], self.robot, self.master)
+        loaded = load(scenario, [*_texts(self._simulation), *_texts(self.set or {})], self.robot, self.master)
+        for note in loaded.notes:
+            warnings.warn(note, ScenarioNote, stacklevel=2)
+        return loaded
 
     @property
     def _simulation(self) -> dict[str, Any]:
@@ -205,12 +209,6 @@ class Changes:
         if self.master is None or self.master == scenario.simulation.master:
             return scenario.changed(**simulation)
         return scenario.changed(_kept_options(scenario, self.master), exchange=None, master=self.master, **simulation)
-
-
-def _found(scenario: Path | str) -> Path:
-    """Return the file of a scenario that is given by its path, or by the name of a file in ``scenarios``."""
-    path = Path(scenario)
-    return path if path.suffix == ".toml" or path.is_file() else Path("scenarios", f"{scenario}.toml")
 
 
 def _ready(scenario: Scenario) -> System:

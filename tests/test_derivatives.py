@@ -12,7 +12,8 @@ import numpy as np
 import pytest
 
 from orchestrator.coupling.fmu.derivatives import Partials, states
-from orchestrator.coupling.fmu.instance import Fmu, FmuError
+from orchestrator.coupling.fmu.failure import FmuError
+from orchestrator.coupling.fmu.instance import Fmu
 from orchestrator.coupling.graph.graph import Graph
 from orchestrator.coupling.graph.links import Connection
 from orchestrator.coupling.masters import MASTERS
@@ -140,13 +141,13 @@ def loop(path: Path, **parameters: float) -> tuple[Graph, list[np.ndarray]]:
     names = [f"[{i}]" for i in range(1, M + 1)]
     pairs = [(f"{x}.y{e}", f"{y}.u{e}") for x, y in ("ab", "ba") for e in names]
     graph = Graph(parts, [Connection(*pair) for pair in pairs])
-    evaluations, residual = [], graph._loop_residual
+    evaluations, residual = [], graph.loop.residual
 
     def counted(z: np.ndarray) -> np.ndarray:
         evaluations.append(z)
         return residual(z)
 
-    graph._loop_residual = counted  # type: ignore[method-assign]
+    graph.loop.residual = counted  # type: ignore[method-assign]
     return graph, evaluations
 
 

@@ -18,7 +18,6 @@ from typing import Any
 
 import pytest
 
-import orchestrator
 from orchestrator.coupling.masters.options import master_options
 
 ROOT = Path(__file__).resolve().parents[1]
@@ -46,7 +45,6 @@ def in_shell(text: str, folder: Path) -> None:
     assert end.returncode == 0, f"{text}\n{end.stdout}\n{end.stderr}"
 
 
-@pytest.mark.skipif(not hasattr(orchestrator, "run"), reason="the Python interface is not there yet")
 @pytest.mark.parametrize("page", EXECUTED, ids=lambda page: page.stem)
 def test_the_snippets_of_the_page_run(page: Path, tmp_path: Path, monkeypatch: pytest.MonkeyPatch) -> None:
     monkeypatch.chdir(tmp_path)

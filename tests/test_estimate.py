@@ -12,7 +12,8 @@ import numpy as np
 import pytest
 
 from orchestrator.coupling.errors import InputError
-from orchestrator.coupling.fmu.instance import Fmu, FmuError
+from orchestrator.coupling.fmu.failure import FmuError
+from orchestrator.coupling.fmu.instance import Fmu
 from orchestrator.coupling.graph.graph import Graph
 from orchestrator.coupling.graph.links import Connection
 from orchestrator.coupling.run.log import Log

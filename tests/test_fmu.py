@@ -13,7 +13,8 @@ import pytest
 
 from orchestrator.coupling.exchange import suffixed
 from orchestrator.coupling.fmu.description import unzip_folder
-from orchestrator.coupling.fmu.instance import NOT_FINITE, TIMEOUT, Fmu, FmuError
+from orchestrator.coupling.fmu.failure import NOT_FINITE, TIMEOUT, FmuError
+from orchestrator.coupling.fmu.instance import Fmu
 from orchestrator.coupling.graph.graph import Graph
 from orchestrator.coupling.graph.links import Connection
 from orchestrator.coupling.masters import MASTERS
@@ -175,9 +176,7 @@ def test_hang_in_a_process_of_its_own():
     status 3."""
     code = (
         "import os\n"
-        "from orchestrator.graph import Graph\n"
-        "from orchestrator.masters import MASTERS\n"
-        "from orchestrator.simulation import simulate\n"
+        "from orchestrator.coupling import MASTERS, Graph, simulate\n"
         "from tests.fmus import fmu\n"
         "graph = Graph({'a': fmu('odd', 'a', fault=3, fault_time=0.1)}, [])\n"
         "log = simulate(graph, MASTERS['jacobi'](graph), 0.0, 1.0, 0.05, timeout=1.0)\n"

@@ -9,7 +9,7 @@ from __future__ import annotations
 import numpy as np
 import pytest
 
-from orchestrator.coupling.fmu.instance import FmuError
+from orchestrator.coupling.fmu.failure import FmuError
 from orchestrator.coupling.graph.graph import Graph
 from orchestrator.coupling.graph.links import Connection, GraphError
 from orchestrator.coupling.masters import MASTERS

@@ -8,7 +8,8 @@ from time import perf_counter, sleep
 import numpy as np
 import pytest
 
-from orchestrator.coupling.fmu.instance import TIMEOUT, Fmu
+from orchestrator.coupling.fmu.failure import TIMEOUT
+from orchestrator.coupling.fmu.instance import Fmu
 from orchestrator.coupling.graph.graph import Graph
 from orchestrator.coupling.graph.links import Connection
 from orchestrator.coupling.masters import MASTERS

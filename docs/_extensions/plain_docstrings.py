@@ -86,6 +86,14 @@ def converted(lines: list[str]) -> list[str]:
     return result
 
 
+def shortened(signature: str) -> str:
+    """Return a signature without the bounds of its types, and readable where Sphinx cannot read it (a field's factory)."""
+    signature = re.sub(r"~?[\w.]*\bAnnotated\[([^,\[\]]+), [^\[\]]*\]", r"\1", signature)
+    if "<factory>" in signature:
+        signature = re.sub(r"~[\w.]+\.(\w+)", r"\1", signature).replace("<factory>", "…")
+    return signature
+
+
 def setup(app: Any) -> dict[str, bool]:
     """Register the extension."""
 
@@ -93,12 +101,9 @@ def setup(app: Any) -> dict[str, bool]:
         lines[:] = converted(lines)
 
     def shorten(
-        _app: Any, _what: str, _name: str, _object: Any, _options: Any, signature: str | None, returns: Any
-    ) -> Any:
-        """Shorten the types of a signature that Sphinx cannot read (a field's factory), as it does with the others."""
-        if signature and "<factory>" in signature:
-            return re.sub(r"~[\w.]+\.(\w+)", r"\1", signature).replace("<factory>", "…"), returns
-        return None
+        _app: Any, _what: str, _name: str, _object: Any, _options: Any, signature: str | None, returns: str | None
+    ) -> tuple[str, str | None] | None:
+        return signature and (shortened(signature), returns)
 
     app.connect("autodoc-process-docstring", process)
     app.connect("autodoc-process-signature", shorten)

@@ -68,8 +68,10 @@ def in_unit(wanted: str) -> AfterValidator:
             raise ValueError(f'needs its unit; add unit = "{wanted}", or one that converts to it')
         values, given = quantity.value, quantity.unit
         if isinstance(values, tuple):
-            return quantity.model_copy(update={"value": tuple(convert(v, given, wanted) for v in values)})
-        return quantity.model_copy(update={"value": convert(values, given, wanted)})
+            return quantity.model_copy(
+                update={"value": tuple(convert(v, given, wanted) for v in values), "unit": wanted}
+            )
+        return quantity.model_copy(update={"value": convert(values, given, wanted), "unit": wanted})
 
     return AfterValidator(lambda quantity: converted(_sourced(quantity)))
 

@@ -196,8 +196,8 @@ def _find(name_or_path: str, folder: Path) -> Path:
     if is_file(name_or_path):
         return folder / name_or_path
     if name_or_path not in names():
-        known = f"{nearest(name_or_path, names())}; known here: {', '.join(names())}, or the path of a .toml file"
-        raise InputError(f"no robot {name_or_path!r} in the catalogue{known}")
+        hint = nearest(name_or_path, names()) or f"; choose {', '.join(names())}, or the path of a .toml file"
+        raise InputError(f"no robot {name_or_path!r} in the catalogue{hint}")
     return FOLDER / f"{name_or_path}.toml"
 
 

@@ -29,5 +29,6 @@ def find(name_or_path: str | Path, beside: Path = Path()) -> Path:
         return path
     if text in names():
         return folder() / f"{text}.toml"
-    hint = nearest(Path(text).stem, names())
+    near = [*(file.name for file in path.parent.glob("*.toml")), *names()] if path.parent.is_dir() else names()
+    hint = nearest(path.name, near)
     raise InputError(f"{text}: no such scenario file{hint}; `orchestrator list` shows the names of those there are")

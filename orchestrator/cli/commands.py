@@ -8,6 +8,7 @@ from __future__ import annotations
 
 import os
 import sys
+import warnings
 from pathlib import Path
 from typing import Annotated, Any
 
@@ -15,6 +16,7 @@ import typer
 from typer.core import TyperGroup
 
 import orchestrator
+from orchestrator.cli import new
 from orchestrator.cli.printing import (
     complain,
     complain_of,
@@ -32,6 +34,7 @@ class Commands(TyperGroup):
 
     def invoke(self, ctx: Any) -> Any:
         """Carry out one command."""
+        warnings.showwarning = lambda message, *_: complain(str(message))
         try:
             return super().invoke(ctx)
         except OrchestratorError as error:
@@ -58,11 +61,17 @@ app = typer.Typer(
     "2 wrong input; 3 the run failed; 130 interrupted.",
 )
 
-ScenarioFile = Annotated[Path, typer.Argument(metavar="SCENARIO", help="Scenario file (TOML).")]
+app.add_typer(new.app, name="new")
+
+ScenarioFile = Annotated[
+    str, typer.Argument(metavar="SCENARIO", help="A shipped scenario's name, or a scenario file (TOML).")
+]
 Out = Annotated[
     Path | None, typer.Option(help="Directory of the results; it must not exist. Default: runs/SCENARIO-NNN.")
 ]
-Robot = Annotated[str | None, typer.Option(metavar="NAME|FILE.fmu", help="Another robot in the scenario's place.")]
+Robot = Annotated[
+    str | None, typer.Option(metavar="NAME|FILE.toml|FILE.fmu", help="Another robot in the scenario's place.")
+]
 MasterName = Annotated[str | None, typer.Option(help="Another master, see `orchestrator list`.")]
 MacroStep = Annotated[float | None, typer.Option(help="Another macro step, s.")]
 Stop = Annotated[float | None, typer.Option(help="Another stop time, s.")]

@@ -8,7 +8,7 @@ from contextlib import contextmanager
 
 from fmus.module.variables import ModuleError
 from orchestrator.coupling.errors import InputError, RunError, nearest
-from orchestrator.coupling.fmu.instance import FmuError
+from orchestrator.coupling.fmu.failure import FmuError
 from orchestrator.coupling.fmu.sub_steps import check_steps
 from orchestrator.coupling.graph.graph import Graph
 from orchestrator.coupling.masters import MASTERS, Master
@@ -24,7 +24,7 @@ def opened(system: System | Scenario) -> Iterator[Graph]:
     scenario = system.scenario
     try:
         graph = system.graph()
-        check_steps(graph.components, scenario.simulation.macro_step)  # type: ignore[arg-type]
+        check_steps(graph.components, scenario.simulation.macro_step)
     except (ModuleError, ValueError) as error:
         raise InputError(f"{scenario.path}: {line}" for line in str(error).splitlines()) from None
     except FmuError as error:

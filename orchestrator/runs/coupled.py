@@ -9,7 +9,7 @@ from functools import cached_property
 import numpy as np
 
 from orchestrator.coupling.errors import InputError, RunError
-from orchestrator.coupling.fmu.instance import FmuError
+from orchestrator.coupling.fmu.failure import FmuError
 from orchestrator.coupling.graph.graph import Graph
 from orchestrator.coupling.masters import StepReport
 from orchestrator.coupling.run.interrupt import interruptible

@@ -27,6 +27,10 @@ from orchestrator.catalogue.quantities import Scalar
 DEFAULT_MASTER = "iqn_ils"
 
 
+class ScenarioNote(UserWarning):
+    """What was decided in reading a scenario that its author may not expect."""
+
+
 class Section(BaseModel):
     """A table of the scenario file: no unknown keys, no conversion between types, no NaN or infinity."""
 

@@ -32,6 +32,8 @@ LABELS = ("ok", "warning", "discard", "error", "fatal", "pending")
 
 Call = Callable[[], int]
 Sink = Callable[[int, str], None]
+SavedState = c_void_p
+"""Handle on the complete state of an instance."""
 
 
 def _text(message: bytes | None) -> str:
@@ -120,15 +122,15 @@ class Fmi2:
         """Advance from `t` to `t + h`; rollback behind `t` stays allowed."""
         return self._do_step(t, h, 0)
 
-    def get_state(self, state: c_void_p) -> int:
+    def get_state(self, state: SavedState) -> int:
         """Save the FMU's state in `state`."""
         return self._get_state(byref(state))
 
-    def set_state(self, state: c_void_p) -> int:
+    def set_state(self, state: SavedState) -> int:
         """Take the state back."""
         return self._set_state(state)
 
-    def free_state(self, state: c_void_p) -> int:
+    def free_state(self, state: SavedState) -> int:
         """Free a saved state."""
         return self._free_state(byref(state))
 
@@ -218,17 +220,3 @@ def finalize_python(library: Any) -> None:
     function = getattr(library, "finalizePythonInterpreter", None)
     if function is not None:
         function()
-
-
-__all__ = [
-    "DISCARD",
-    "ERROR",
-    "FATAL",
-    "LABELS",
-    "OK",
-    "WARNING",
-    "Call",
-    "Fmi2",
-    "Fmi3",
-    "finalize_python",
-]

@@ -10,149 +10,37 @@ import atexit
 import contextlib
 import logging
 from collections.abc import Mapping, Sequence
-from ctypes import c_void_p
 from pathlib import Path
 from time import perf_counter
-from typing import Any
+from typing import Any, Self
 
 import fmpy
 import numpy as np
 
 from orchestrator.coupling.errors import nearest
-from orchestrator.coupling.fmu.binding import DISCARD, ERROR, FATAL, LABELS, WARNING, Call, Fmi2, Fmi3, finalize_python
+from orchestrator.coupling.fmu.binding import (
+    DISCARD,
+    ERROR,
+    FATAL,
+    LABELS,
+    WARNING,
+    Fmi2,
+    Fmi3,
+    SavedState,
+    finalize_python,
+)
 from orchestrator.coupling.fmu.description import Port, Value, capabilities_of, ports_of, read_description, unzip
+from orchestrator.coupling.fmu.failure import NOT_FINITE, FmuError
+from orchestrator.coupling.fmu.group import Group
 
 logging.getLogger("fmus").addHandler(logging.NullHandler())  # what our FMUs say comes through FMI, like that of others
 
-NOT_FINITE, TIMEOUT = 5, 6
 SHORTER, FORWARD = "; a smaller macro step may help", "; take a master that never goes back, jacobi or gauss_seidel"
 CURES = {DISCARD: SHORTER, NOT_FINITE: SHORTER}
-SavedState = c_void_p
-
-
-class FmuError(Exception):
-    """An FMU failed.
-
-    Attributes
-    ----------
-    component : name of the instance
-    time : s, start of the step that failed
-    status : 2 discard, 3 error, 4 fatal (FMI); 5 an output is not finite, 6 no answer in time
-    message : what happened, with the FMU's own last message
-    """
-
-    def __init__(self, component: str, time: float, status: int, message: str):
-        super().__init__(f"{component}, t = {time:.9g} s: {message}")
-        self.component, self.time, self.status, self.message = component, time, status, message
-
-    @property
-    def recoverable(self) -> bool:
-        """Whether a shorter step may help."""
-        return self.status in (DISCARD, NOT_FINITE)
-
-
-class _Block:
-    """Variables of one FMI type in a group; `pick` are their places in the group, (n,)."""
-
-    def __init__(self, fmu: Fmu, fmi_type: str, ports: list[Port], pick: np.ndarray, values: np.ndarray):
-        kind, dtype = fmu.fmi.TYPES[fmi_type]
-        firsts = dict.fromkeys((p.vr, p.size) for p in ports)
-        starts = np.cumsum([0, *(size for _, size in firsts)])
-        place = {vr: int(start) for (vr, _), start in zip(firsts, starts, strict=False)}
-        self.vr = np.array([vr for vr, _ in firsts], dtype=np.uint32)
-        self.elements = np.array([place[p.vr] + p.element for p in ports], dtype=np.intp)
-        self.pick, self.values = pick, values
-        direct = dtype is np.float64 and pick.size == values.size == int(starts[-1])
-        self.direct = direct and bool(np.all(pick == self.elements))
-        self.buffer = values if self.direct else np.zeros(int(starts[-1]), dtype=dtype)
-        self.partial = len(set(self.elements.tolist())) < int(starts[-1])
-        self.get_call: Call = fmu.fmi.accessor("Get", kind, self.vr, self.buffer)
-        self.set_call: Call = fmu.fmi.accessor("Set", kind, self.vr, self.buffer)
-
-    def get(self) -> int:
-        status = self.get_call()
-        if not self.direct:
-            self.values[self.pick] = self.buffer[self.elements]
-        return status
-
-    def set(self) -> int:
-        if self.partial:  # the other elements of the array stay as they are
-            self.get_call()
-        if not self.direct:
-            self.buffer[self.elements] = self.values[self.pick]
-        return self.set_call()
-
-
-class Group:
-    """Several variables of one FMU that are read or written together.
-
-    Attributes
-    ----------
-    values : (n,) float64; integers and Booleans are cast
-    """
-
-    __slots__ = ("_get", "_set", "fmu", "names", "ones", "runs", "values")
-
-    def __init__(self, fmu: Fmu, names: Sequence[str], values: np.ndarray | None = None):
-        self.fmu, self.names = fmu, tuple(names)
-        self.values = np.zeros(len(self.names)) if values is None else values
-        if self.values.shape != (len(self.names),) or not self.values.flags.c_contiguous:
-            raise ValueError(f"{fmu.name}: the buffer must be contiguous and hold {len(self.names)} numbers")
-        self.ones = np.ones(len(self.names))
-        ports = [fmu.port(name) for name in names]
-        types = dict.fromkeys(p.fmi_type for p in ports)
-        picks = {
-            kind: np.array([i for i, p in enumerate(ports) if p.fmi_type == kind], dtype=np.intp) for kind in types
-        }
-        for port in ports:
-            if not port.is_number:
-                raise ValueError(f"{fmu.name}: {port.name} is a {port.kind} and has no place among numbers")
-        self.runs = [_Block(fmu, kind, [ports[i] for i in pick], pick, self.values) for kind, pick in picks.items()]
-
-        # one direct run is the common case: its call is used as it is
-        direct = len(self.runs) == 1 and self.runs[0].direct
-        self._get: Call = self.runs[0].get_call if direct else self._get_runs
-        self._set: Call = self.runs[0].set_call if direct else self._set_runs
-
-    def _get_runs(self) -> int:
-        return max((run.get() for run in self.runs), default=0)
-
-    def _set_runs(self) -> int:
-        return max((run.set() for run in self.runs), default=0)
-
-    def get(self) -> None:
-        """Read all from the FMU into `values`."""
-        status = self._get()
-        if status > WARNING:
-            raise self.fmu.error(status, f"reading {self._span()}")
-
-    def set(self) -> None:
-        """Write all of `values` to the FMU."""
-        status = self._set()
-        if status > WARNING:
-            raise self.fmu.error(status, f"writing {self._span()}")
-
-    def get_finite(self) -> None:
-        """Read all; raise `FmuError` if a value is not finite."""
-        status = self._get()
-        if status > WARNING:
-            raise self.fmu.error(status, f"reading {self._span()}")
-        total = self.values.dot(self.ones)
-        if not -np.inf < total < np.inf:
-            self._name_not_finite()
-
-    def _span(self) -> str:
-        return self.names[0] if len(self.names) == 1 else f"{self.names[0]} … {self.names[-1]}"
-
-    def _name_not_finite(self) -> None:
-        bad = [name for name, value in zip(self.names, self.values, strict=True) if not np.isfinite(value)]
-        if bad:
-            more = f" and {len(bad) - 1} more" if len(bad) > 1 else ""
-            raise self.fmu.failure(NOT_FINITE, f"output {bad[0]}{more} is not a finite number")
 
 
 class Fmu:
-    """One instance of a co-simulation FMU (FMI 2.0 or 3.0).
+    """One instance of a co-simulation FMU (FMI 2.0 or 3.0); a context manager that frees it at its end.
 
     Parameters
     ----------
@@ -192,6 +80,12 @@ class Fmu:
             raise ValueError(f"{self.path}: the FMU cannot be loaded: {error}{hint}") from error
         _instances.append(self)
 
+    def __enter__(self) -> Self:
+        return self
+
+    def __exit__(self, *_: object) -> None:
+        self.close()
+
     def _message(self, status: int, text: str) -> None:
         label = LABELS[status] if 0 <= status < len(LABELS) else str(status)
         self.log.append(f"[{label}] {text}")
@@ -208,8 +102,18 @@ class Fmu:
         said = f"; the FMU says: {_gist(self.log[-1])}" if self.log else ""
         return FmuError(self.name, self.time, status, what + said + (cure or CURES.get(status, "")))
 
+    @property
+    def closed(self) -> bool:
+        """Whether the instance has been freed."""
+        return self not in _instances
+
+    def _require_open(self) -> None:
+        if self.closed:  # a call would end the process
+            raise ValueError(f"{self.name}: has been closed; load the FMU once more")
+
     def port(self, name: str) -> Port:
         """Return the port; `ValueError` names the nearest one."""
+        self._require_open()
         if name not in self.ports:
             raise ValueError(f"{self.name}: no variable {name}{nearest(name, self.ports)}")
         return self.ports[name]
@@ -284,6 +188,7 @@ class Fmu:
 
     def enter_initialization(self, start: float, stop: float | None = None) -> None:
         """Set up the experiment and enter initialisation mode."""
+        self._require_open()
         self.time = start
         self._call("initialisation", self.fmi.enter_initialization, start, stop)
 
@@ -317,7 +222,7 @@ class Fmu:
 
     def save(self) -> SavedState:
         """Return a handle on the complete state; to be given to `release` in the end."""
-        state = c_void_p()
+        state = SavedState()
         status = self.fmi.get_state(state)
         if status > WARNING:
             raise self.error(max(status, ERROR), "saving the state", FORWARD)
@@ -335,7 +240,7 @@ class Fmu:
 
     def close(self) -> None:
         """End and free the instance, as far as FMI allows it; does nothing the second time."""
-        if self not in _instances or self.busy_since:  # a call that hangs in there would not let this one through
+        if self.closed or self.busy_since:  # a call that hangs in there would not let this one through
             return
         _instances.remove(self)
         _libraries.append(self.fmi.slave.dll)

@@ -11,9 +11,11 @@ from pathlib import Path
 import numpy as np
 
 from orchestrator.coupling.exchange import suffixed
-from orchestrator.coupling.fmu.binding import ERROR
+from orchestrator.coupling.fmu.binding import ERROR, SavedState
 from orchestrator.coupling.fmu.description import Port
-from orchestrator.coupling.fmu.instance import Fmu, FmuError, Group, SavedState
+from orchestrator.coupling.fmu.failure import FmuError
+from orchestrator.coupling.fmu.group import Group
+from orchestrator.coupling.fmu.instance import Fmu
 
 WHOLE = 1e-6  # how far a number of steps may be from a whole one
 RELATIVE = re.compile(r"(^|\.)rotation(\.[xyz])?$")  # counted from the start of the step
@@ -197,11 +199,12 @@ class SubStepped(Fmu):
 class _Seen(Group):
     """Variables of a sub-stepped FMU as its master sees them."""
 
-    __slots__ = ("_inner_get", "_inner_set", "_made_up", "_put", "_real", "_whole", "buffer")
+    __slots__ = ("_inner_get", "_inner_set", "_made_up", "_put", "_real", "_whole", "buffer", "whole")
 
     def __init__(self, fmu: SubStepped, names: Sequence[str], values: np.ndarray | None):
         real = [i for i, name in enumerate(names) if name not in fmu.made_up]
         super().__init__(fmu, [names[i] for i in real])
+        self.whole = fmu
         self.buffer, self._real = self.values, np.array(real, dtype=np.intp)
         self._inner_get, self._inner_set = self._get, self._set
         self._get, self._set = self._read, self._write
@@ -213,17 +216,16 @@ class _Seen(Group):
         self._whole = _pairs(names, outputs)
 
     def _read(self) -> int:
-        fmu: SubStepped = self.fmu  # type: ignore[assignment]
         status = self._inner_get()
         self.values[self._real] = self.buffer
-        self.values[self._made_up[0]] = fmu.held[self._made_up[1]]
-        if fmu.stepped:
-            self.values[self._whole[0]] = fmu.given[self._whole[1]]
+        self.values[self._made_up[0]] = self.whole.held[self._made_up[1]]
+        if self.whole.stepped:
+            self.values[self._whole[0]] = self.whole.given[self._whole[1]]
         return status
 
     def _write(self) -> int:
         self.buffer[:] = self.values[self._real]
-        self.fmu.held[self._put[1]] = self.values[self._put[0]]  # type: ignore[attr-defined]
+        self.whole.held[self._put[1]] = self.values[self._put[0]]
         return self._inner_set()
 
 

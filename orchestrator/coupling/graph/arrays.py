@@ -8,7 +8,8 @@ from dataclasses import dataclass
 import numpy as np
 
 from orchestrator.coupling.exchange import suffixed
-from orchestrator.coupling.fmu.instance import Fmu, Group
+from orchestrator.coupling.fmu.group import Group
+from orchestrator.coupling.fmu.instance import Fmu
 from orchestrator.coupling.graph.links import Link, Signal
 
 

@@ -12,7 +12,9 @@ from typing import Any, Protocol, Self
 
 import numpy as np
 
-from orchestrator.coupling.fmu.instance import Fmu, FmuError, SavedState
+from orchestrator.coupling.fmu.binding import SavedState
+from orchestrator.coupling.fmu.failure import FmuError
+from orchestrator.coupling.fmu.instance import Fmu
 from orchestrator.coupling.graph.arrays import Arrays, Node
 from orchestrator.coupling.graph.links import Connection, GraphError, checked_links
 from orchestrator.coupling.graph.loops import AlgebraicLoop

@@ -7,7 +7,7 @@ import contextlib
 import numpy as np
 
 from orchestrator.coupling.fmu.derivatives import Partials
-from orchestrator.coupling.fmu.instance import FmuError
+from orchestrator.coupling.fmu.failure import FmuError
 from orchestrator.coupling.graph.arrays import Arrays, Node
 
 ITERATIONS, TOLERANCE, DIFFERENCE = 20, 1e-11, 1e-6
@@ -40,7 +40,7 @@ class AlgebraicLoop:
         message = f"the algebraic loop through {names} … has no solution near the start values; change them"
         raise FmuError(arrays.nodes[0].name, start, 2, message)
 
-    def _residual(self, z: np.ndarray) -> np.ndarray:
+    def residual(self, z: np.ndarray) -> np.ndarray:
         """Set the inputs to `z` (m,); return how far the outputs contradict them."""
         arrays = self.arrays
         arrays.gather()
@@ -54,7 +54,7 @@ class AlgebraicLoop:
     def _newton(self, z: np.ndarray, own: list[Node]) -> bool:
         """Newton's method from `z` with the derivatives of `own`, else differences; return whether it converged."""
         for _ in range(ITERATIONS):
-            r = self._residual(z)
+            r = self.residual(z)
             if np.max(np.abs(r) / (np.abs(z) + 1.0)) <= TOLERANCE:
                 self.arrays.gather()
                 return True
@@ -69,7 +69,7 @@ class AlgebraicLoop:
         for j in np.flatnonzero(np.isnan(jacobian[0])):
             shifted = z.copy()
             shifted[j] += DIFFERENCE * (1.0 + abs(z[j]))
-            jacobian[:, j] = (self._residual(shifted) - r) / (shifted[j] - z[j])
+            jacobian[:, j] = (self.residual(shifted) - r) / (shifted[j] - z[j])
         return jacobian
 
     def _write_own(self, node: Node, jacobian: np.ndarray) -> None:

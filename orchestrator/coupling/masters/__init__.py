@@ -2,6 +2,8 @@
 
 from __future__ import annotations
 
+from orchestrator.coupling.errors import nearest
+from orchestrator.coupling.graph.graph import Graph
 from orchestrator.coupling.masters.aitken import Aitken
 from orchestrator.coupling.masters.anderson import Anderson
 from orchestrator.coupling.masters.fixed_point import FixedPoint
@@ -28,4 +30,24 @@ MASTERS: dict[str, type[Master]] = {
     "reduced_interface": ReducedInterface,
 }
 
-__all__ = ["MASTERS", "Master", "StepReport"]
+
+def made_for(graph: Graph, master: Master | type[Master] | str) -> Master:
+    """Return `master` itself, or one of that class or name for `graph`, with default options.
+
+    Raises
+    ------
+    ValueError
+        if there is no such master, it was made for another graph, or it cannot couple these FMUs
+    """
+    if isinstance(master, str):
+        if master not in MASTERS:
+            raise ValueError(f"master {master!r}: choose {', '.join(MASTERS)}{nearest(master, MASTERS)}")
+        master = MASTERS[master]
+    if isinstance(master, type):
+        return master(graph)
+    if master.graph is not graph:
+        raise ValueError(f"master {master.NAME}: was made for another graph; make it for the one that is run")
+    return master
+
+
+__all__ = ["MASTERS", "Master", "StepReport", "made_for"]

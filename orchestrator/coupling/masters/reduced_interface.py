@@ -8,7 +8,8 @@ from typing import ClassVar
 
 import numpy as np
 
-from orchestrator.coupling.fmu.instance import Fmu, SavedState
+from orchestrator.coupling.fmu.binding import SavedState
+from orchestrator.coupling.fmu.instance import Fmu
 from orchestrator.coupling.graph.graph import Graph, Node
 from orchestrator.coupling.graph.links import GraphError
 from orchestrator.coupling.stepping.bounds import Positive, PositiveCount

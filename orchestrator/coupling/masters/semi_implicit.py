@@ -7,7 +7,7 @@ from typing import Any, ClassVar
 
 import numpy as np
 
-from orchestrator.coupling.fmu.instance import SavedState
+from orchestrator.coupling.fmu.binding import SavedState
 from orchestrator.coupling.graph.graph import Graph
 from orchestrator.coupling.stepping.accelerator import Accelerator
 from orchestrator.coupling.stepping.bounds import Positive, PositiveCount

@@ -7,7 +7,7 @@ from collections.abc import Callable, Iterator
 from contextlib import contextmanager
 from typing import Any
 
-from orchestrator.coupling.fmu.instance import FmuError
+from orchestrator.coupling.fmu.failure import FmuError
 
 
 class Interruption(FmuError):

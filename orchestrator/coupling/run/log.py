@@ -8,8 +8,11 @@ from dataclasses import dataclass, field
 import numpy as np
 
 from orchestrator.coupling.errors import nearest
-from orchestrator.coupling.fmu.instance import FmuError, Group
+from orchestrator.coupling.fmu.failure import FmuError
+from orchestrator.coupling.fmu.group import Group
+from orchestrator.coupling.fmu.instance import Fmu
 from orchestrator.coupling.graph.graph import Graph
+from orchestrator.coupling.run.results import Table
 from orchestrator.coupling.stepping.report import StepReport
 
 
@@ -20,7 +23,8 @@ class Log:
     Attributes
     ----------
     time : (n + 1,) s, communication points, the start included
-    signals, values : names, and (n + 1, len(signals))
+    signals, values : names ``component.variable``, and (n + 1, len(signals))
+    units : signal → unit that its FMU declares, ``1`` where it declares none
     steps : n reports
     wall, wall_first : s, the loop without its first step; that step, with all it compiles
     wall_components, solves : seconds inside each FMU's steps and their number, both without the first macro
@@ -44,10 +48,23 @@ class Log:
     energy: dict[str, np.ndarray] = field(default_factory=dict)
     energy_residual: dict[str, np.ndarray] = field(default_factory=dict)
     error: FmuError | None = None
+    units: dict[str, str] = field(default_factory=dict)
 
     def signal(self, name: str) -> np.ndarray:
-        """Return one signal over time, (n + 1,)."""
+        """Return one signal over time, (n + 1,); `ValueError` names the nearest one that was recorded."""
+        if name not in self.signals:
+            raise ValueError(f"{name} was not recorded{nearest(name, self.signals)}")
         return self.values[:, self.signals.index(name)]
+
+    @property
+    def table(self) -> Table:
+        """All signals over time by name, ``time`` first, (n + 1,) each."""
+        return {"time": self.time, **dict(zip(self.signals, self.values.T, strict=True))}
+
+    def raise_error(self) -> None:
+        """Raise what ended the run before its time, if anything did."""
+        if self.error is not None:
+            raise self.error
 
     @property
     def power_residual(self) -> dict[str, np.ndarray]:
@@ -72,25 +89,33 @@ class Recorder:
     Parameters
     ----------
     record : signals ``component.variable``; None: every output that is a number
+
+    Attributes
+    ----------
+    signals, units : what is read, and the unit of each, by name
     """
 
     def __init__(self, graph: Graph, record: Sequence[str] | None):
         self.signals = _all_outputs(graph) if record is None else list(record)
         owners = [signal.partition(".")[0] for signal in self.signals]
+        missing = [s for s, owner in zip(self.signals, owners, strict=True) if owner not in graph.components]
+        if missing:
+            raise ValueError(f"cannot record {missing[0]}: no such component{nearest(missing[0], graph.components)}")
         self.row = np.zeros(len(self.signals))
         self.groups: list[tuple[Group, np.ndarray | None]] = []
         for component, fmu in graph.components.items():
             places = np.array([i for i, owner in enumerate(owners) if owner == component], dtype=np.intp)
-            if not places.size:
-                continue
-            names = [self.signals[i].partition(".")[2] for i in places]
-            if places[-1] - places[0] + 1 == places.size:  # neighbours: the FMU writes them where they belong
-                self.groups.append((fmu.group(names, self.row[places[0] : places[-1] + 1]), None))
-            else:
-                self.groups.append((fmu.group(names), places))
-        missing = [s for s, owner in zip(self.signals, owners, strict=True) if owner not in graph.components]
-        if missing:
-            raise ValueError(f"cannot record {missing[0]}: no such component{nearest(missing[0], graph.components)}")
+            if places.size:
+                self.groups.append(self._group(fmu, places))
+        split = {signal: signal.partition(".") for signal in self.signals}
+        self.units = {s: graph.components[owner].ports[name].unit or "1" for s, (owner, _, name) in split.items()}
+
+    def _group(self, fmu: Fmu, places: np.ndarray) -> tuple[Group, np.ndarray | None]:
+        """Return a handle on the signals at `places`, all of `fmu`, and where its values go if not into the row itself."""
+        names = [self.signals[i].partition(".")[2] for i in places]
+        if places[-1] - places[0] + 1 == places.size:  # neighbours: the FMU writes them where they belong
+            return fmu.group(names, self.row[places[0] : places[-1] + 1]), None
+        return fmu.group(names), places
 
     def read(self, row: np.ndarray) -> None:
         """Read all signals into `row` (len(signals),)."""

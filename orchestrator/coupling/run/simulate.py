@@ -8,32 +8,37 @@ from time import perf_counter
 
 import numpy as np
 
-from orchestrator.coupling.fmu.instance import TIMEOUT, FmuError
+from orchestrator.coupling.fmu.failure import TIMEOUT, FmuError
+from orchestrator.coupling.fmu.instance import Fmu
 from orchestrator.coupling.fmu.sub_steps import check_steps
 from orchestrator.coupling.graph.graph import Graph
+from orchestrator.coupling.masters import made_for
 from orchestrator.coupling.run.log import Log, Recorder
 from orchestrator.coupling.run.work import Work
 from orchestrator.coupling.stepping.master import Master
 from orchestrator.coupling.stepping.report import StepReport
 
-DIVIDES = 1e-9  # how far (stop - start)/H may be from a whole number
+DIVIDES = 1e-9  # how far (stop - start)/macro_step may be from a whole number
 
 
 def simulate(
     graph: Graph,
-    master: Master,
+    master: Master | type[Master] | str,
     start: float,
     stop: float,
-    H: float,
+    macro_step: float,
     record: Sequence[str] | None = None,
     on_step: Callable[[StepReport], None] | None = None,
     timeout: float | None = None,
 ) -> Log:
-    """Initialise the graph and advance it from `start` to `stop` in macro steps `H` (s).
+    """Initialise the graph and advance it from `start` to `stop` in macro steps (s).
 
     Parameters
     ----------
-    record : signals to record (numbers of any type); None: every output
+    master : a master made for `graph`, ``IqnIls(graph, tolerance=1e-9)``; or its class or its name in `MASTERS`, with
+        default options
+    start, stop, macro_step : s; the macro step divides the time between them
+    record : signals to record (numbers of any type), ``component.variable``; None: every output
     on_step : called after every macro step
     timeout : s of wall time that one call of an FMU may take. The run is then made in a thread of its own;
         an FMU that hangs is left behind in it, and the caller should end the process (`os._exit`) once the
@@ -42,38 +47,43 @@ def simulate(
     Returns
     -------
     Log
-        with `error` set, and all steps up to it, if an FMU failed
+        signals with their units at the communication points. If an FMU failed its `error` is set, and it has all
+        steps up to there; `Log.raise_error` raises it
 
     Raises
     ------
     ValueError
-        if `H` does not divide the time, does not suit an FMU's internal step, or a signal does not exist
+        if the macro step does not divide the time, does not suit an FMU's internal step, or a signal or a master of
+        that name does not exist
     """
-    n = _steps(start, stop, H)
-    check_steps(graph.components, H)  # type: ignore[arg-type]
-    recorder = Recorder(graph, record)
-    time, values = start + H * np.arange(n + 1), np.full((n + 1, len(recorder.signals)), np.nan)
-    log = Log(master.NAME, H, recorder.signals, time, values)
-    run = _Loop(graph, master, recorder, log, on_step)
+    n = _steps(start, stop, macro_step)
+    check_steps(graph.components, macro_step)
+    master, recorder = made_for(graph, master), Recorder(graph, record)
+    time, values = start + macro_step * np.arange(n + 1), np.full((n + 1, len(recorder.signals)), np.nan)
+    log = Log(master.NAME, macro_step, recorder.signals, time, values, units=recorder.units)
+    simulation = _Simulation(graph, master, recorder, log, on_step)
     if timeout is None:
-        run(start, stop)
+        simulation(start, stop)
     else:
-        _watched(run, start, stop, timeout)
-    run.finish()
+        _watched(simulation, start, stop, timeout)
+    simulation.finish()
     return log
 
 
 def _steps(start: float, stop: float, H: float) -> int:
     if not H > 0.0:
         raise ValueError(f"macro step {H:g} s: must be positive")
+    if not stop > start:
+        raise ValueError(f"stop time {stop:g} s: must be after the start at {start:g} s")
     n = round((stop - start) / H)
     if n < 1 or abs(n * H - (stop - start)) > DIVIDES * (stop - start):
-        raise ValueError(f"macro step {H:g} s does not divide {stop - start:g} s; choose one that does")
+        near = (stop - start) / max(n, 1)
+        raise ValueError(f"macro step {H:g} s does not divide {stop - start:g} s; {near:.6g} s does")
     return n
 
 
-class _Loop:
-    """The loop of `simulate`, callable from a thread."""
+class _Simulation:
+    """One run, callable from a thread."""
 
     def __init__(
         self,
@@ -89,12 +99,13 @@ class _Loop:
         self.work = Work(graph)
         self.energy = np.zeros((log.time.size, len(self.work.names)))
         self.residual = np.zeros_like(self.energy)
+        self.before = {name: (0.0, 0) for name in graph.components}  # wall and solves of the first macro step
 
     def __call__(self, start: float, stop: float) -> None:
         try:
             with np.errstate(over="ignore", invalid="ignore"):  # what diverges is found by its values
                 self._initialize(start, stop)
-                self._loop()
+                self._advance()
         except FmuError as error:
             if not self.abandoned:
                 self.log.error = error
@@ -115,33 +126,37 @@ class _Loop:
         self.recorder.read(self.log.values[0])
         self.rows = 1
 
-    def _loop(self) -> None:
-        log, times, step = self.log, self.log.time.tolist(), self.master.step
-        H, book = log.macro_step, bool(self.work.names)
+    def _advance(self) -> None:
+        log, step, H = self.log, self.master.step, self.log.macro_step
         clock = perf_counter()
-        for i, t in enumerate(times[:-1]):
+        for t in log.time[:-1].tolist():
             if self.abandoned:
                 return
             report = step(t, H)
             if self.abandoned:  # it came back after all
                 return
-            self.recorder.read(log.values[i + 1])
-            log.steps.append(report)
-            if book:
-                self.energy[i + 1], self.residual[i + 1] = self.work.total, self.work.residual
-                report.power_residual = _largest(self.residual[i + 1] - self.residual[i]) / H
-            self.rows = i + 2
-            if self.on_step is not None:
-                self.on_step(report)
-            if not i:
+            self._note(report)
+            if self.rows == 2:
                 log.wall_first, clock = perf_counter() - clock, perf_counter()
-                self._first = {name: (fmu.wall, fmu.solves) for name, fmu in self.graph.components.items()}
+                self.before = {name: (fmu.wall, fmu.solves) for name, fmu in self.graph.components.items()}
             log.wall = perf_counter() - clock
+
+    def _note(self, report: StepReport) -> None:
+        """Write the macro step that has just been made into the log."""
+        log, row = self.log, self.rows
+        self.recorder.read(log.values[row])
+        log.steps.append(report)
+        if self.work.names:
+            self.energy[row], self.residual[row] = self.work.total, self.work.residual
+            report.power_residual = _largest(self.residual[row] - self.residual[row - 1]) / log.macro_step
+        self.rows += 1
+        if self.on_step is not None:
+            self.on_step(report)
 
     def abandon(self) -> None:
         """Leave the run's thread to itself, and all FMUs to it: the call it waits for may return."""
         self.abandoned = True
-        for fmu in self.graph.components.values():  # type: ignore[union-attr]
+        for fmu in self.graph.components.values():
             fmu.abandoned = True
 
     def finish(self) -> None:
@@ -153,9 +168,8 @@ class _Loop:
         log.energy = dict(zip(self.work.names, self.energy[:n].T, strict=True))
         booked = [i for i, name in enumerate(self.work.names) if not np.isnan(self.residual[:1, i]).any()]
         log.energy_residual = {self.work.names[i]: self.residual[:n, i] for i in booked}
-        first = getattr(self, "_first", {})
         for name, fmu in self.graph.components.items():
-            wall, solves = first.get(name, (0.0, 0))
+            wall, solves = self.before[name]
             log.wall_components[name], log.solves[name] = fmu.wall - wall, fmu.solves - solves
 
 
@@ -165,24 +179,28 @@ def _largest(energies: np.ndarray) -> float:
     return float(np.max(np.abs(booked))) if booked.size else np.nan
 
 
-def _watched(run: _Loop, start: float, stop: float, timeout: float) -> None:
+def _watched(simulation: _Simulation, start: float, stop: float, timeout: float) -> None:
     """Run in a thread; give up when one call of an FMU lasts longer than `timeout` (s)."""
-    thread = threading.Thread(target=run, args=(start, stop), daemon=True)
+    thread = threading.Thread(target=simulation, args=(start, stop), daemon=True)
     thread.start()
-    fmus = run.graph.components.values()  # type: ignore[union-attr]
     try:
         while thread.is_alive():
             thread.join(min(timeout / 4, 0.25))
-            given = perf_counter() - timeout
-            hung = [fmu for fmu in fmus if 0.0 < fmu.busy_since < given]
+            hung = _hung(simulation.graph, timeout)
             if hung and thread.is_alive():
                 message = f"no answer within {timeout:g} s; raise the time-out?"
-                run.log.error = FmuError(hung[0].name, hung[0].time, TIMEOUT, message)
-                run.abandon()
+                simulation.log.error = FmuError(hung[0].name, hung[0].time, TIMEOUT, message)
+                simulation.abandon()
                 return
     except BaseException:
-        run.abandoned = True
+        simulation.abandoned = True
         thread.join(timeout)
         if thread.is_alive():
-            run.abandon()
+            simulation.abandon()
         raise
+
+
+def _hung(graph: Graph, timeout: float) -> list[Fmu]:
+    """Return the FMUs whose call has taken longer than `timeout` (s) by now."""
+    given = perf_counter() - timeout
+    return [fmu for fmu in graph.components.values() if 0.0 < fmu.busy_since < given]

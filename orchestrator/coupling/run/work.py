@@ -18,7 +18,7 @@ from typing import Any
 import numpy as np
 
 from orchestrator.coupling.exchange import suffixed
-from orchestrator.coupling.fmu.instance import Group
+from orchestrator.coupling.fmu.group import Group
 from orchestrator.coupling.graph.graph import Graph, Node
 
 PAIRS = {

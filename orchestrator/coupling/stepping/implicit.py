@@ -14,7 +14,8 @@ from typing import Any, ClassVar
 
 import numpy as np
 
-from orchestrator.coupling.fmu.instance import ERROR, FmuError, SavedState
+from orchestrator.coupling.fmu.binding import ERROR, SavedState
+from orchestrator.coupling.fmu.failure import FmuError
 from orchestrator.coupling.graph.graph import Graph, Node
 from orchestrator.coupling.graph.links import GraphError
 from orchestrator.coupling.stepping.accelerator import Accelerator

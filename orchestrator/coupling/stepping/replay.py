@@ -7,8 +7,10 @@ from collections.abc import Iterable
 
 import numpy as np
 
+from orchestrator.coupling.fmu.binding import ERROR
 from orchestrator.coupling.fmu.description import Port
-from orchestrator.coupling.fmu.instance import ERROR, FmuError, Group
+from orchestrator.coupling.fmu.failure import FmuError
+from orchestrator.coupling.fmu.group import Group
 from orchestrator.coupling.graph.graph import Node
 
 REPLAY = 1e-12  # relative difference of the outcomes of the same step from the same state
