@@ -20,8 +20,9 @@ from typing import Any
 
 import numpy as np
 
+from orchestrator.catalogue.documents import read_once
 from orchestrator.coupling.errors import InputError, RunError, nearest
-from orchestrator.coupling.masters.options import master_options
+from orchestrator.coupling.masters import MASTERS
 from orchestrator.runs.compare import Comparison, compared
 from orchestrator.runs.coupled import run_coupled
 from orchestrator.runs.directory import RunDirectory, claimed
@@ -39,6 +40,7 @@ from orchestrator.runs.reference import solve_reference
 from orchestrator.runs.result import Run, Signal, run_label
 from orchestrator.runs.summary import result
 from orchestrator.runs.systems import System, resolve
+from orchestrator.scenario.layers import shared_options
 from orchestrator.scenario.read import load
 from orchestrator.scenario.types import Scenario, ScenarioNote
 
@@ -111,10 +113,11 @@ def run(
     InputError : scenario or options are wrong, or `out` exists; nothing was run
     RunError : the run failed at its very start
     """
-    loaded = Changes(set, robot, master, macro_step, stop, timeout, estimate).of(scenario)
-    with _directory(out, loaded.name) as directory:
-        found = _run(resolve(loaded), progress or _silent)
-        return found if directory is None else write_run(directory, found, _draw(pictures))
+    with read_once():
+        loaded = Changes(set, robot, master, macro_step, stop, timeout, estimate).of(scenario)
+        with _directory(out, loaded.name) as directory:
+            found = _run(resolve(loaded), progress or _silent)
+            return found if directory is None else write_run(directory, found, _draw(pictures))
 
 
 def compare(
@@ -151,11 +154,12 @@ def compare(
     RunError : a run failed at its very start, or the reference did; the runs made so far are written if `out` is given
     """
     changes = Changes(set, robot, master, macro_step, stop, timeout)
-    first = changes.of(scenario)
-    variants = _variants(scenario, first, changes, masters, macro_steps)
-    with _directory(out, f"{first.name}-compare") as directory:
-        found = _compared(resolve(first), variants, progress or _silent, directory)
-        return found if directory is None else write_comparison(directory, found, _draw(pictures))
+    with read_once():
+        first = changes.of(scenario)
+        variants = _variants(scenario, first, changes, masters, macro_steps)
+        with _directory(out, f"{first.name}-compare") as directory:
+            found = _compared(resolve(first), variants, progress or _silent, directory)
+            return found if directory is None else write_comparison(directory, found, _draw(pictures))
 
 
 def load_scenario(
@@ -170,7 +174,8 @@ def load_scenario(
     estimate: str | None = None,
 ) -> Scenario:
     """Read and check a scenario, with other values as for `run`; `InputError` names all that is wrong with it."""
-    return Changes(set, robot, master, macro_step, stop, timeout, estimate).of(scenario)
+    with read_once():
+        return Changes(set, robot, master, macro_step, stop, timeout, estimate).of(scenario)
 
 
 @dataclass(frozen=True)
@@ -206,15 +211,10 @@ class Changes:
         simulation = {key.removeprefix("simulation."): value for key, value in self._simulation.items()}
         if self.master is None or self.master == scenario.simulation.master:
             return scenario.changed(**simulation)
-        return scenario.changed(_kept_options(scenario, self.master), exchange=None, master=self.master, **simulation)
-
-
-def _kept_options(scenario: Scenario, master: str) -> dict[str, Any]:
-    """Return those options of the scenario's master that are also for another one: the tolerance."""
-    masters = master_options()
-    if master not in masters:
-        raise InputError(f"{scenario.name}: simulation.master: no master {master!r}{nearest(master, masters)}")
-    return {key: value for key, value in scenario.master.items() if key == "tolerance" and key in masters[master]}
+        if self.master not in MASTERS:
+            raise InputError(f"{scenario.name}: no master {self.master!r}{nearest(self.master, MASTERS)}")
+        options = shared_options(scenario.master, self.master)
+        return scenario.changed(options, exchange=None, master=self.master, **simulation)
 
 
 def _variants(
