@@ -7,6 +7,8 @@ from collections.abc import Callable, Iterator, Sequence
 from contextlib import contextmanager
 from typing import TYPE_CHECKING
 
+from fmus.kernels import notice
+
 if TYPE_CHECKING:
     from orchestrator.runs.compare import Comparison
     from orchestrator.runs.result import Run
@@ -122,6 +124,7 @@ def progress_bars(quiet: bool) -> Iterator[Callable[[str, float, float], None]]:
         BarColumn(),
         TextColumn("{task.completed:.2f} of {task.total:g} s"),
     )
+    notice.muted = quiet
     console, tasks = Console(stderr=True, quiet=quiet), dict[str, TaskID]()
     with Progress(*columns, TimeElapsedColumn(), TimeRemainingColumn(), console=console, disable=quiet) as bars:
 

@@ -34,16 +34,16 @@ def landing_graph(landing: Landing, exchange: str) -> Graph:
     `waveform` becomes `hermite` where cable or robot does not give its means, `point` where one takes no slopes.
     """
     components: dict[str, Fmu] = {}
+    files = _files(landing)
     try:
-        components["cable"] = instance(_cable(landing), "cable", landing.cable.steps)
+        components["cable"] = instance(files["cable"], "cable", landing.cable.steps)
         components["cable"].set_parameters(_inner_step(landing, EXCHANGES[exchange]) | dict(landing.cable.settings))
-        components["robot"] = instance(_robot(landing), "robot", landing.robot.steps)
+        components["robot"] = instance(files["robot"], "robot", landing.robot.steps)
         components["robot"].set_parameters(landing.robot.settings)
         possible = _possible(EXCHANGES[exchange], components)
         told = {**landing.contact.settings, PARAMETER: possible.name}
-        contact = landing.contact.foreign or library.contact_fmu()
         for k, s in enumerate(landing.placement.arc_lengths, start=1):
-            components[f"contact{k}"] = Fmu(contact, f"contact{k}")
+            components[f"contact{k}"] = Fmu(files["contact"], f"contact{k}")
             components[f"contact{k}"].set_parameters({**told, "initial.s": s})
         return Graph(components, _connections(components, possible), order=tuple(components))
     except BaseException:
@@ -52,13 +52,14 @@ def landing_graph(landing: Landing, exchange: str) -> Graph:
         raise
 
 
-def _cable(landing: Landing) -> Path:
-    return landing.cable.foreign or library.cable_fmu()
-
-
-def _robot(landing: Landing) -> Path:
-    spec = landing.sources.spec
-    return library.robot_fmu(spec) if spec is not None else Path(str(landing.robot.foreign))
+def _files(landing: Landing) -> dict[str, Path]:
+    """Return the FMUs of cable, robot and contact; those of ours that are missing are built side by side."""
+    parts, spec = {"cable": landing.cable, "robot": landing.robot, "contact": landing.contact}, landing.sources.spec
+    foreign = {name: part.foreign for name, part in parts.items() if part.foreign is not None}
+    ours = {name: library.module_recipe(name) for name in ("cable", "contact") if name not in foreign}
+    if spec is not None:
+        ours["robot"] = library.robot_recipe(spec)
+    return foreign | dict(zip(ours, library.kept(ours.values()), strict=True))
 
 
 def _inner_step(landing: Landing, exchange: Exchange) -> dict[str, Value]:
