@@ -26,11 +26,9 @@ import llvmlite
 import numba
 import numpy as np
 
-from fmus.kernels import compilation
 from fmus.kernels.cache import prune, remove, used, user_folder
+from fmus.kernels.compilation import Compilation
 
-if __name__ == "fmus.kernels.jit":  # not the copy within an FMU
-    compilation.watch()
 LIBRARIES = {*sys.stdlib_module_names, "numba", "numpy", "scipy", "llvmlite"} - {"__main__"}
 """What is not looked into: their versions, not their sources, decide over the compiled code."""
 VERSIONS = f"{sys.version} {numba.__version__} {llvmlite.__version__} {np.__version__}"
@@ -39,7 +37,9 @@ IMPORT = re.compile(
 )
 
 _decorating = threading.RLock()
-_folders: dict[str, Path] = {}
+_folders: dict[str, Path] = {}  # of compiled code, by the name of the module with the kernels
+COMPILATION = Compilation(_folders)
+"""Says that this process compiles kernels."""
 
 
 def kernel(function: Callable) -> Callable:

@@ -16,24 +16,19 @@ from orchestrator.catalogue.robot_spec import RobotSpec, catalogue
 from orchestrator.coupling.errors import InputError
 
 
-def cable_fmu() -> Path:
-    """Return the FMU of the cable, up to date."""
-    return module_fmu("cable")
-
-
-def contact_fmu() -> Path:
-    """Return the FMU of the contact, up to date."""
-    return module_fmu("contact")
-
-
 def module_fmu(name: str) -> Path:
     """Return the FMU of a module of the registry, up to date."""
-    return _kept([registry.find(name).recipe()])[0]
+    return kept([module_recipe(name)])[0]
+
+
+def module_recipe(name: str) -> FmuRecipe:
+    """Return the recipe of a module of the registry."""
+    return registry.find(name).recipe()
 
 
 def robot_fmu(robot: RobotSpec) -> Path:
     """Return the FMU of a robot, up to date."""
-    return _kept([robot_recipe(robot)])[0]
+    return kept([robot_recipe(robot)])[0]
 
 
 def robot_recipe(robot: RobotSpec) -> FmuRecipe:
@@ -43,20 +38,27 @@ def robot_recipe(robot: RobotSpec) -> FmuRecipe:
 
 
 def build_all(folder: Path | None) -> list[Path]:
-    """Build the FMUs of our modules and of every robot of the catalogue in `folder`, or where runs keep them."""
-    from fmus.face.build import ensure_fmus
+    """Build the FMUs of all modules and of every robot of the catalogue in `folder`.
 
-    ours = [registry.find(key).recipe() for key in registry.OURS if key != "robot"]  # robots: those of the catalogue
+    None: where runs keep them, and all is made ready for a landing, compiled kernels too.
+    """
+    from fmus.face.build import ensure_all, plain
+    from fmus.face.first_use import compile_modules
+
+    ours = [module_recipe(key) for key in registry.OURS if key != "robot"]  # robots: those of the catalogue
     recipes = (*ours, *map(robot_recipe, catalogue().values()))
-    return _kept(recipes) if folder is None else _within(folder, lambda: ensure_fmus(recipes, folder))
+    if folder is None:
+        compile_modules()
+        return kept(recipes)
+    return _within(folder, lambda: ensure_all(plain(recipe, folder) for recipe in recipes))
 
 
-def _kept(recipes: Iterable[FmuRecipe]) -> list[Path]:
+def kept(recipes: Iterable[FmuRecipe]) -> list[Path]:
     """Return the FMUs of `recipes` where runs keep them, up to date."""
-    from fmus.face.build import ensure_fmus, kept_fmu
+    from fmus.face import build
 
     folder = _folder()
-    return [used(path) for path in _within(folder, lambda: ensure_fmus(recipes, folder, kept_fmu))]
+    return [used(p) for p in _within(folder, lambda: build.ensure_all(build.kept(r, folder) for r in recipes))]
 
 
 def _folder() -> Path:

@@ -23,6 +23,7 @@ from pydantic import (
 
 from fmus.module import registry
 from orchestrator.catalogue.quantities import Scalar
+from orchestrator.coupling.exchange import Choice
 
 DEFAULT_MASTER = "iqn_ils"
 
@@ -66,7 +67,7 @@ class Simulation(Section):
     stop_time: Annotated[Positive, In("s")]
     macro_step: Annotated[Positive, In("s")]
     master: str = DEFAULT_MASTER
-    exchange: Literal["point", "hermite", "waveform"] | None = None
+    exchange: Choice | None = None
     tolerances: dict[str, Positive] = {}
     estimate: Literal["finer", "coarser", "none"] = "finer"
     timeout: Annotated[Positive | None, In("s")] = None

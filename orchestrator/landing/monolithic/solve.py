@@ -20,6 +20,7 @@ from fmus.module.variables import ModuleError
 from fmus.robot import dynamics
 from fmus.robot import rigid_body as rb
 from fmus.robot.module import Robot, body_parameters, initial_state
+from orchestrator.coupling.exchange import only_couples
 from orchestrator.landing.monolithic import control as steps
 from orchestrator.landing.monolithic.contacts import settle
 from orchestrator.landing.monolithic.state import (
@@ -159,7 +160,6 @@ def _control(robot: Robot, n_wheels: int) -> np.ndarray:
 class _Recorder:
     """Writes the modules' own outputs at the output times."""
 
-    SKIP = ("_mean.", ".work", ".rotation", "_rate.")
     CONTACT = (
         "normal_force",
         "friction_force",
@@ -188,7 +188,7 @@ class _Recorder:
         self._angles = self._robot_state[dynamics.ANGLES : dynamics.ANGLES + 3]
 
     def _names(self, names: Sequence[str]) -> list[str]:
-        return [name for name in names if not any(part in name for part in self.SKIP)]
+        return [name for name in names if not (only_couples(name) or ".work" in name)]
 
     def record(self, i: int) -> None:
         """Write row `i` from the present state."""
