@@ -1,4 +1,4 @@
-# make env | run | test | lint | verify | bench
+# make env | run | test | lint | docs | measure | verify | bench
 # The interpreter is the first of PYTHON, python3, python3.13, python3.12, python3.11 that is 3.11 or newer.
 
 SHELL := /bin/bash

@@ -20,6 +20,8 @@ from typing import Any
 
 import numpy as np
 
+from fmus.face.first_use import compile_modules
+from fmus.kernels.jit import COMPILATION
 from orchestrator.catalogue.documents import read_once
 from orchestrator.coupling.errors import InputError, RunError, nearest
 from orchestrator.coupling.masters import MASTERS
@@ -42,7 +44,7 @@ from orchestrator.runs.summary import result
 from orchestrator.runs.systems import System, resolve
 from orchestrator.scenario.layers import shared_options
 from orchestrator.scenario.read import load
-from orchestrator.scenario.types import Scenario, ScenarioNote
+from orchestrator.scenario.types import LandingScenario, Scenario, ScenarioNote
 
 __all__ = [
     "Comparison",
@@ -116,7 +118,7 @@ def run(
     with read_once():
         loaded = Changes(set, robot, master, macro_step, stop, timeout, estimate).of(scenario)
         with _directory(out, loaded.name) as directory:
-            found = _run(resolve(loaded), progress or _silent)
+            found = _run(_ready(loaded), progress or _silent)
             return found if directory is None else write_run(directory, found, _draw(pictures))
 
 
@@ -158,7 +160,7 @@ def compare(
         first = changes.of(scenario)
         variants = _variants(scenario, first, changes, masters, macro_steps)
         with _directory(out, f"{first.name}-compare") as directory:
-            found = _compared(resolve(first), variants, progress or _silent, directory)
+            found = _compared(_ready(first), variants, progress or _silent, directory)
             return found if directory is None else write_comparison(directory, found, _draw(pictures))
 
 
@@ -217,6 +219,13 @@ class Changes:
         return scenario.changed(options, exchange=None, master=self.master, **simulation)
 
 
+def _ready(scenario: Scenario) -> System:
+    """Return the scenario resolved; a landing's kernels are compiled before, which takes half the time side by side."""
+    if isinstance(scenario, LandingScenario):
+        compile_modules()
+    return resolve(scenario)
+
+
 def _variants(
     scenario: Scenario | Path | str,
     first: Scenario,
@@ -239,6 +248,7 @@ def _compared(
         for variant in variants:
             runs.append(_run(system.changed(variant.master, **dict(variant.simulation)), progress, estimate=False))
         reference = solve_reference(system, steps, _told(progress, "reference", system.scenario))
+        COMPILATION.conclude()
     except RunError as error:
         if runs and directory is not None:
             write_unfinished(directory, runs, str(error))
@@ -253,6 +263,7 @@ def _run(system: System, progress: Progress, estimate: bool = True) -> Run:
     coupled = run_coupled(system, _told(progress, label, system.scenario))
     if estimate:
         estimate_error(coupled, _told(progress, f"error estimate, {simulation.estimate} run", system.scenario))
+    COMPILATION.conclude()
     return result(coupled)
 
 

@@ -3,6 +3,7 @@
 import dataclasses
 import json
 import os
+import re
 import subprocess
 import sys
 import time
@@ -11,15 +12,16 @@ from pathlib import Path
 
 import pytest
 
-from fmus.face import build, lock
-from fmus.face.build import ensure_fmu, kept_fmu
+from fmus.face import build, first_use, lock
+from fmus.face.build import ensure_fmu, kept
 from fmus.face.lock import locked
 from fmus.kernels import cache, jit
+from fmus.module import registry
 from fmus.module.variables import ModuleError
-from fmus.oscillator.oscillator_fmu import RECIPE
 from orchestrator.catalogue import library
 from orchestrator.coupling.errors import InputError
 
+RECIPE = registry.find("oscillator").recipe()
 HOLD = "import sys, time; from pathlib import Path; from fmus.face.lock import locked\n"
 HOLD += "with locked(Path(sys.argv[1])): print('held', flush=True); time.sleep(60)"
 
@@ -79,7 +81,8 @@ def test_a_held_lock_is_waited_for_with_a_message_and_a_limit(tmp_path, holder, 
     with pytest.raises(ModuleError, match=message), locked(tmp_path / "x", limit=0.5):
         pass
     assert 0.5 < time.monotonic() - start < 10.0
-    assert capsys.readouterr().err == f"line-landing: waiting for another process, which holds {tmp_path / '.x.lock'}\n"
+    said = f"line-landing: waiting for another process, which holds {tmp_path / '.x.lock'} …\n"
+    assert capsys.readouterr().err == said
 
 
 def test_a_process_that_is_killed_leaves_no_lock(tmp_path, holder):
@@ -111,9 +114,9 @@ def test_threads_take_turns_and_leave_no_file(tmp_path):
 
 def test_four_processes_that_need_an_fmu_at_once_build_it_once(tmp_path):
     code = "import sys; from pathlib import Path; from fmus.face import build\n"
-    code += "from fmus.oscillator.oscillator_fmu import RECIPE\n"
+    code += "from fmus.module.registry import find\n"
     code += "made = []; before = build._build; build._build = lambda *a: (made.append(1), before(*a))[1]\n"
-    code += "print(build.kept_fmu(RECIPE, Path(sys.argv[1])).name, len(made))"
+    code += "print(build.kept(find('oscillator').recipe(), Path(sys.argv[1])).ensured().name, len(made))"
     with ThreadPoolExecutor(4) as pool:
         done = list(pool.map(lambda _: run_python(code, tmp_path), range(4)))
     assert [d.returncode for d in done] == [0] * 4, [d.stderr for d in done]
@@ -124,12 +127,12 @@ def test_four_processes_that_need_an_fmu_at_once_build_it_once(tmp_path):
 
 def test_two_of_one_name_have_a_file_each(quick, tmp_path):
     other = dataclasses.replace(RECIPE, start={**RECIPE.start, "mass": 2.0})
-    first, second = kept_fmu(RECIPE, tmp_path), kept_fmu(other, tmp_path)
+    first, second = kept(RECIPE, tmp_path).ensured(), kept(other, tmp_path).ensured()
     written = first.stat().st_mtime_ns
     assert first.name.startswith("oscillator-") and second.name.startswith("oscillator-") and first != second
-    assert kept_fmu(RECIPE, tmp_path) == first and first.stat().st_mtime_ns == written
+    assert kept(RECIPE, tmp_path).ensured() == first and first.stat().st_mtime_ns == written
     first.write_bytes(first.read_bytes()[:100])
-    assert kept_fmu(RECIPE, tmp_path) == first and build._holds(first, build.record(RECIPE))
+    assert kept(RECIPE, tmp_path).ensured() == first and kept(RECIPE, tmp_path).is_there
 
 
 def test_what_is_up_to_date_needs_no_folder_to_write_to(quick, tmp_path, monkeypatch):
@@ -202,3 +205,37 @@ def test_what_former_versions_have_compiled_is_removed(own_cache):
         folder.mkdir(parents=True)
     jit._remove_former(own_cache / "kernels")
     assert not any(folder.exists() for folder in former)
+
+
+# --- first use ---------------------------------------------------------------------------------------------
+
+
+def test_compiling_is_said_before_and_after_and_only_then(tmp_path):
+    (tmp_path / "own.py").write_text(
+        "from fmus.kernels.jit import kernel\n\n\n@kernel\ndef half(x):\n    return 0.5 * x\n"
+    )
+    places = {"LINE_LANDING_CACHE": tmp_path / "cache", "PYTHONPATH": tmp_path}
+    first, second = (run_python("import own; print(own.half(3.0))", **places) for _ in range(2))
+    assert first.stdout == second.stdout == "1.5\n"
+    before, after = first.stderr.splitlines()
+    assert before.startswith("line-landing: compiling kernels for this machine, once")
+    assert re.fullmatch(r"line-landing: kernels were compiled in \d+ s", after)
+    assert second.stderr == ""
+
+
+def test_kernels_of_modules_that_have_none_compiled_are_compiled_side_by_side(own_cache, monkeypatch, capsys):
+    compiled, made = ["fmus.contact"], []
+    monkeypatch.setattr(first_use, "is_compiled", lambda package: package in compiled)
+    monkeypatch.setattr(first_use, "_compile_elsewhere", made.append)
+    first_use.compile_modules()
+    before, after = capsys.readouterr().err.splitlines()
+    assert sorted(made) == ["cable", "robot"] and "(cable, robot)" in before and "were compiled in" in after
+    compiled += ["fmus.cable", "fmus.robot"]
+    first_use.compile_modules()
+    assert len(made) == 2 and capsys.readouterr().err == ""
+
+
+@pytest.mark.parametrize("name", first_use.LANDING)
+def test_all_kernels_that_a_module_needs_are_compiled_by_a_first_step(name):
+    first_use.compile_module(name)
+    assert jit.is_compiled(f"fmus.{name}")

@@ -18,7 +18,7 @@ import pytest
 from fmpy.fmi1 import FMICallException
 from fmpy.validation import validate_fmu
 
-from fmus.face.build import build_fmu, ensure_fmu, ensure_fmus, is_stale, rename_imports
+from fmus.face.build import build_fmu, ensure_all, ensure_fmu, is_stale, plain, rename_imports
 from fmus.module.recipe import FmuRecipe
 from fmus.module.units import unit
 from fmus.module.variables import ModuleError
@@ -283,7 +283,7 @@ def test_only_what_is_stale_is_built(path):
 
 
 def test_many_are_built_at_once(path, tmp_path):
-    twice = ensure_fmus([RECIPE, dataclasses.replace(RECIPE, name="twin"), RECIPE], tmp_path)
+    twice = ensure_all(plain(r, tmp_path) for r in (RECIPE, dataclasses.replace(RECIPE, name="twin"), RECIPE))
     assert [p.name for p in twice] == ["oscillator.fmu", "twin.fmu", "oscillator.fmu"]
     assert twice[0].read_bytes() == path.read_bytes()
     assert sorted(p.name for p in tmp_path.iterdir()) == ["oscillator.fmu", "twin.fmu"]

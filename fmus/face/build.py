@@ -1,6 +1,6 @@
 """The build: from a recipe to an FMU, the same bytes from the same input.
 
-    python -m fmus.face.build [--out DIR]        builds cable, contact and robot, without --out in the user's cache
+    python -m fmus.face.build [--out DIR]        builds those of our modules, without --out in the user's cache
 
 An FMU holds the binary of pythonfmu, a script of its own name, and a copy of the sources under a name made of
 their hash (see fmu_start.py). Each is put together in a process of its own, which imports that copy and reads
@@ -23,7 +23,7 @@ import sys
 import tempfile
 import uuid
 import zipfile
-from collections.abc import Callable, Iterable, Mapping
+from collections.abc import Iterable, Mapping
 from concurrent.futures import ThreadPoolExecutor
 from dataclasses import dataclass
 from pathlib import Path
@@ -39,6 +39,8 @@ from fmus.face.lock import locked
 from fmus.face.model_description import documentation, model_description
 from fmus.kernels import cache
 from fmus.kernels.cache import user_folder
+from fmus.kernels.notice import notice
+from fmus.module import registry
 from fmus.module.recipe import FmuRecipe, make_module
 from fmus.module.variables import ModuleError, VariableTable
 
@@ -48,66 +50,79 @@ EPOCH = int(os.environ.get("SOURCE_DATE_EPOCH", 315532800))
 """Date of every file in an FMU, s: 1980-01-01 (zip knows none earlier) or what the environment asks for."""
 
 
-def build_fmu(recipe: FmuRecipe, folder: Path) -> Path:
-    """Build ``NAME.fmu`` in `folder`, in a process of its own; return its path."""
-    path = _named(folder, recipe.name)
-    with locked(path):
-        return _build(recipe, path)
+@dataclass(frozen=True)
+class Target:
+    """An FMU that is wanted.
+
+    Attributes
+    ----------
+    recipe : what it is made of
+    path : where it is to be
+    facts : what decides over its content, see `record`
+    """
+
+    recipe: FmuRecipe
+    path: Path
+    facts: Mapping[str, Any]
+
+    @property
+    def is_there(self) -> bool:
+        """Whether the FMU at the path was made from these facts."""
+        try:
+            with zipfile.ZipFile(self.path) as archive:
+                return json.loads(archive.read(RECORD)) == self.facts
+        except (OSError, KeyError, ValueError, zipfile.BadZipFile):
+            return False
+
+    def ensured(self, *, anew: bool = False) -> Path:
+        """Return the path of the FMU, built if need be: what is there needs no lock, its folder may be read-only."""
+        if self.is_there and not anew:
+            return self.path
+        self.path.parent.mkdir(parents=True, exist_ok=True)
+        with locked(self.path):
+            return self.path if self.is_there and not anew else _build(self.recipe, self.path)
 
 
-def ensure_fmu(recipe: FmuRecipe, folder: Path) -> Path:
-    """Build ``NAME.fmu`` in `folder` if it is missing or older than its sources; return its path."""
-    return _up_to_date(recipe, _named(folder, recipe.name), record(recipe))
+def plain(recipe: FmuRecipe, folder: Path) -> Target:
+    """Return the FMU of `recipe` as ``NAME.fmu`` in `folder`."""
+    return Target(recipe, Path(folder).resolve() / f"{recipe.name}.fmu", record(recipe))
 
 
-def kept_fmu(recipe: FmuRecipe, folder: Path) -> Path:
-    """Build ``NAME-HASH.fmu`` in `folder` if it is missing; return its path.
+def kept(recipe: FmuRecipe, folder: Path) -> Target:
+    """Return the FMU of `recipe` as ``NAME-HASH.fmu`` in `folder`.
 
     The hash is that of all that decides over the content: two robots of one name and two versions of this program
     have a file each.
     """
     facts = record(recipe)
-    return _up_to_date(recipe, _named(folder, f"{recipe.name}-{_hash(facts)}"), facts)
+    digits = hashlib.sha256(json.dumps(facts, sort_keys=True).encode()).hexdigest()[:16]
+    return Target(recipe, Path(folder).resolve() / f"{recipe.name}-{digits}.fmu", facts)
 
 
-def ensure_fmus(
-    recipes: Iterable[FmuRecipe], folder: Path, ensure: Callable[[FmuRecipe, Path], Path] = ensure_fmu
-) -> list[Path]:
-    """Do so, or `kept_fmu`, for many, as many at a time as there are processors; return their paths in the same order."""
-    with ThreadPoolExecutor(os.cpu_count()) as pool:
-        return list(pool.map(lambda recipe: ensure(recipe, folder), recipes))
+def build_fmu(recipe: FmuRecipe, folder: Path) -> Path:
+    """Build ``NAME.fmu`` in `folder`, in a process of its own; return its path."""
+    return plain(recipe, folder).ensured(anew=True)
 
 
-def _up_to_date(recipe: FmuRecipe, path: Path, facts: Mapping[str, Any]) -> Path:
-    """Return `path`, built anew if need be; what is up to date is not locked: its folder may be read-only."""
-    if _holds(path, facts):
-        return path
-    path.parent.mkdir(parents=True, exist_ok=True)
-    with locked(path):
-        return path if _holds(path, facts) else _build(recipe, path)
+def ensure_fmu(recipe: FmuRecipe, folder: Path) -> Path:
+    """Build ``NAME.fmu`` in `folder` if it is missing or older than its sources; return its path."""
+    return plain(recipe, folder).ensured()
 
 
-def _named(folder: Path, name: str) -> Path:
-    """Return the path of the FMU called `name` in `folder`."""
-    return Path(folder).resolve() / f"{name}.fmu"
-
-
-def _hash(facts: Mapping[str, Any]) -> str:
-    return hashlib.sha256(json.dumps(facts, sort_keys=True).encode()).hexdigest()[:16]
+def ensure_all(targets: Iterable[Target]) -> list[Path]:
+    """Build those of many FMUs that are not there, as many at a time as there are processors; return all their paths."""
+    targets = list(targets)
+    missing = {target.path: target for target in targets if not target.is_there}
+    if missing:
+        notice(f"building FMUs ({', '.join(target.recipe.name for target in missing.values())}) …")
+        with ThreadPoolExecutor(os.cpu_count()) as pool:
+            list(pool.map(Target.ensured, missing.values()))
+    return [target.path for target in targets]
 
 
 def is_stale(path: Path, recipe: FmuRecipe) -> bool:
     """Say whether the FMU at `path` is missing, damaged or made from other sources or another recipe."""
-    return not _holds(path, record(recipe))
-
-
-def _holds(path: Path, facts: Mapping[str, Any]) -> bool:
-    """Say whether there is an FMU at `path` that was made from `facts`."""
-    try:
-        with zipfile.ZipFile(path) as archive:
-            return json.loads(archive.read(RECORD)) == facts
-    except (OSError, KeyError, ValueError, zipfile.BadZipFile):
-        return False
+    return not Target(recipe, path, record(recipe)).is_there
 
 
 def record(recipe: FmuRecipe) -> dict[str, Any]:
@@ -311,12 +326,6 @@ def write_atomically(path: Path, content: bytes) -> None:
         raise
 
 
-def recipes() -> list[FmuRecipe]:
-    """Return the recipes of the FMUs that need no catalogue."""
-    names = ("fmus.cable.cable_fmu", "fmus.contact.contact_fmu", "fmus.robot.robot_fmu")
-    return [importlib.import_module(name).RECIPE for name in names]
-
-
 def main() -> None:
     """Build every FMU, or (in the process of one FMU) assemble the recipe on the standard input."""
     parser = argparse.ArgumentParser(prog="python -m fmus.face.build", description="Build the FMUs.")
@@ -327,8 +336,9 @@ def main() -> None:
         if options.assemble:
             write_atomically(options.assemble, assemble(FmuRecipe(**json.load(sys.stdin))))
         else:
-            place = (options.out, ensure_fmu) if options.out else (user_folder("fmus"), kept_fmu)
-            print(*ensure_fmus(recipes(), *place), sep="\n")
+            recipes = [registry.find(key).recipe() for key in registry.OURS]
+            out = options.out
+            print(*ensure_all(plain(r, out) if out else kept(r, user_folder("fmus")) for r in recipes), sep="\n")
     except ModuleError as error:
         sys.exit(str(error))
 

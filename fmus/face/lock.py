@@ -9,11 +9,11 @@ from __future__ import annotations
 import contextlib
 import errno
 import os
-import sys
 import time
 from collections.abc import Iterator
 from pathlib import Path
 
+from fmus.kernels.notice import notice
 from fmus.module.variables import ModuleError
 
 try:
@@ -60,7 +60,7 @@ def _acquired(lock: Path, limit: float) -> int:
             raise ModuleError(f"{lock}: another process has held this lock for {limit:g} s; {cure}")
         if waited > QUIET and not said:
             said = True
-            print(f"line-landing: waiting for another process, which holds {lock}", file=sys.stderr)
+            notice(f"waiting for another process, which holds {lock} …")
         time.sleep(POLL)
     return handle
 

@@ -4,6 +4,7 @@ from __future__ import annotations
 
 import atexit
 import time
+from collections.abc import Container
 
 from numba.core.event import Event, Listener, register
 
@@ -11,42 +12,36 @@ from fmus.kernels.notice import notice
 
 
 class Compilation(Listener):
-    """Says when the first kernel of a process is compiled, and what all of them took.
+    """Says when the first kernel of a process is compiled, and at the end what all of them took.
 
-    Attributes
+    Parameters
     ----------
-    seconds : wall time spent so far, s
+    modules : names of the modules whose kernels count; a kernel that calls others is compiled around them
     """
 
-    def __init__(self) -> None:
-        self.seconds, self._start, self._depth = 0.0, 0.0, 0
+    def __init__(self, modules: Container[str]):
+        self._modules, self._inside, self._seconds = modules, list[float](), 0.0
+        register("numba:compile", self)
+        atexit.register(self.conclude)
 
     def on_start(self, event: Event) -> None:
-        """Begin to count; a kernel that calls others is compiled around them."""
-        if not self.seconds and not self._depth:
-            notice("compiling kernels for this machine; this is done once and takes up to two minutes …")
-        if not self._depth:
-            self._start = time.monotonic()
-        self._depth += 1
+        """Begin to count."""
+        if self._counts(event):
+            if not (self._inside or self._seconds):
+                notice("compiling kernels for this machine, once; this takes up to two minutes …")
+            self._inside.append(time.monotonic())
 
     def on_end(self, event: Event) -> None:
         """Count what one kernel took, with those that it calls."""
-        self._depth -= 1
-        if not self._depth:
-            self.seconds += time.monotonic() - self._start
+        if self._counts(event):
+            start = self._inside.pop()
+            self._seconds += 0.0 if self._inside else time.monotonic() - start
+
+    def _counts(self, event: Event) -> bool:
+        return event.data is not None and event.data["dispatcher"].py_func.__module__ in self._modules
 
     def conclude(self) -> None:
         """Say how long it took, if anything was compiled since the last time."""
-        if self.seconds:
-            notice(f"kernels were compiled in {self.seconds:.0f} s; they are kept for the next time")
-            self.seconds = 0.0
-
-
-COMPILATION = Compilation()
-"""That of this process."""
-
-
-def watch() -> None:
-    """Listen to Numba, once a process."""
-    register("numba:compile", COMPILATION)
-    atexit.register(COMPILATION.conclude)
+        if self._seconds:
+            notice(f"kernels were compiled in {self._seconds:.0f} s")
+            self._seconds = 0.0

@@ -22,18 +22,18 @@ from typing import Any
 
 import numba
 
-from fmus.kernels import compilation
 from fmus.kernels.cache import prune, remove, used, user_folder
+from fmus.kernels.compilation import Compilation
 
-if __name__ == "fmus.kernels.jit":  # not the copy within an FMU
-    compilation.watch()
 LIBRARIES = {*sys.stdlib_module_names, "numba", "numpy", "scipy", "llvmlite"}
 """What is not looked into: their versions, not their sources, decide over the compiled code."""
 IMPORT = re.compile(
     r"^[ \t]*(?:from[ \t]+([\w.]+)[ \t]+import[ \t]+(\([^)]*\)|[^\n#]*)|import[ \t]+([^\n#]+))", re.MULTILINE
 )
 
-_folders: dict[str, Path] = {}
+_folders: dict[str, Path] = {}  # of compiled code, by the name of the module with the kernels
+COMPILATION = Compilation(_folders)
+"""Says that this process compiles kernels."""
 
 
 def kernel(function: Callable) -> Callable:

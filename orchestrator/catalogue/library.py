@@ -7,64 +7,58 @@ from __future__ import annotations
 
 import os
 from collections.abc import Callable, Iterable
-from importlib import import_module
 from pathlib import Path
 
 from fmus.kernels.cache import prune, used, user_folder
+from fmus.module import registry
 from fmus.module.recipe import FmuRecipe
 from orchestrator.catalogue.robot_spec import RobotSpec, catalogue
 from orchestrator.coupling.errors import InputError
 
-MODULES = ("cable", "contact", "oscillator")
-"""Our modules with one FMU each; robots have one for each entry of the catalogue."""
-
-
-def cable_fmu() -> Path:
-    """Return the FMU of the cable, up to date."""
-    return module_fmu("cable")
-
-
-def contact_fmu() -> Path:
-    """Return the FMU of the contact, up to date."""
-    return module_fmu("contact")
-
 
 def module_fmu(name: str) -> Path:
-    """Return the FMU of one of `MODULES`, up to date."""
-    return _kept([module_recipe(name)])[0]
+    """Return the FMU of a module of the registry, up to date."""
+    return kept([module_recipe(name)])[0]
+
+
+def module_recipe(name: str) -> FmuRecipe:
+    """Return the recipe of a module of the registry."""
+    return registry.find(name).recipe()
 
 
 def robot_fmu(robot: RobotSpec) -> Path:
     """Return the FMU of a robot, up to date."""
-    return _kept([robot_recipe(robot)])[0]
-
-
-def module_recipe(name: str) -> FmuRecipe:
-    """Return the recipe of one of `MODULES`."""
-    return import_module(f"fmus.{name}.{name}_fmu").RECIPE
+    return kept([robot_recipe(robot)])[0]
 
 
 def robot_recipe(robot: RobotSpec) -> FmuRecipe:
     """Return the recipe of a robot."""
-    from fmus.robot.robot_fmu import robot_recipe
-
-    return robot_recipe(robot.fmu_name, robot.n_wheels, robot.parameters, robot.title)
+    wheels = {"n_wheels": robot.n_wheels}
+    return registry.find("robot").recipe(robot.fmu_name, robot.title, wheels, robot.parameters)
 
 
 def build_all(folder: Path | None) -> list[Path]:
-    """Build the FMUs of all modules and of every robot of the catalogue in `folder`, or where runs keep them."""
-    from fmus.face.build import ensure_fmus
+    """Build the FMUs of all modules and of every robot of the catalogue in `folder`.
 
-    recipes = (*map(module_recipe, MODULES), *map(robot_recipe, catalogue().values()))
-    return _kept(recipes) if folder is None else _within(folder, lambda: ensure_fmus(recipes, folder))
+    None: where runs keep them, and all is made ready for a landing, compiled kernels too.
+    """
+    from fmus.face.build import ensure_all, plain
+    from fmus.face.first_use import compile_modules
+
+    ours = [module_recipe(key) for key in registry.OURS if key != "robot"]  # robots: those of the catalogue
+    recipes = (*ours, *map(robot_recipe, catalogue().values()))
+    if folder is None:
+        compile_modules()
+        return kept(recipes)
+    return _within(folder, lambda: ensure_all(plain(recipe, folder) for recipe in recipes))
 
 
-def _kept(recipes: Iterable[FmuRecipe]) -> list[Path]:
+def kept(recipes: Iterable[FmuRecipe]) -> list[Path]:
     """Return the FMUs of `recipes` where runs keep them, up to date."""
-    from fmus.face.build import ensure_fmus, kept_fmu
+    from fmus.face import build
 
     folder = _folder()
-    return [used(path) for path in _within(folder, lambda: ensure_fmus(recipes, folder, kept_fmu))]
+    return [used(p) for p in _within(folder, lambda: build.ensure_all(build.kept(r, folder) for r in recipes))]
 
 
 def _folder() -> Path:

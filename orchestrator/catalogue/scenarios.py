@@ -4,10 +4,9 @@ from __future__ import annotations
 
 from pathlib import Path
 
-import orchestrator
 from orchestrator.coupling.errors import InputError, nearest
 
-PACKAGE = Path(orchestrator.__file__).parent
+PACKAGE = Path(__file__).parents[1]
 
 
 def folder() -> Path:

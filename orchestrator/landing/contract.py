@@ -13,6 +13,7 @@ from typing import Any, Literal
 from fmus.module.variables import Causality, Variable
 from orchestrator.catalogue import modules as vocabulary
 from orchestrator.coupling.errors import InputError
+from orchestrator.coupling.exchange import PARAMETER, suited_to
 
 Standing = Literal["ok", "missing", "wrong", "advice"]
 
@@ -41,7 +42,7 @@ def _scalar(name: str, causality: Causality, unit: str, needed: bool = True, use
     return Point(name, causality, unit, needed, False, use)
 
 
-ENERGY_CONJUGATE = "for exchange = waveform"
+ENERGY_CONJUGATE = f"for {PARAMETER} = {suited_to(implicit=True)}"
 
 ROBOT = (
     Point("wheel[k].force", "input", "N"),

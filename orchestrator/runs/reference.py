@@ -17,7 +17,7 @@ from orchestrator.coupling.run.compare import communication_times, largest_diffe
 from orchestrator.landing import monolithic
 from orchestrator.landing.monolithic import Problem
 from orchestrator.runs.compare import Reference
-from orchestrator.runs.components import only_couples
+from orchestrator.runs.components import is_idle
 from orchestrator.runs.coupled import Reached, completed
 from orchestrator.runs.systems import System, resolve
 from orchestrator.scenario.types import DEFAULT_MASTER, Scenario
@@ -49,7 +49,7 @@ def _monolithic_reference(
         raise RunError(str(error)) from None
     fields, table = system.split({"time": times, **solution.signals})
     contacts = sum(name.endswith(".normal_force") for name in table)
-    table = {name: values for name, values in table.items() if not only_couples(name.partition(".")[2], contacts)}
+    table = {name: values for name, values in table.items() if not is_idle(name.partition(".")[2], contacts)}
     estimates = {name: solution.estimated_error[name] for name in table if name != "time"}
     return Reference("monolithic", table, solution.wall_s, estimates, fields)
 

@@ -21,8 +21,9 @@ from pydantic import (
     model_validator,
 )
 
-from orchestrator.catalogue import modules as vocabulary
+from fmus.module import registry
 from orchestrator.catalogue.quantities import Scalar
+from orchestrator.coupling.exchange import Choice
 
 DEFAULT_MASTER = "iqn_ils"
 
@@ -66,7 +67,7 @@ class Simulation(Section):
     stop_time: Annotated[Positive, In("s")]
     macro_step: Annotated[Positive, In("s")]
     master: str = DEFAULT_MASTER
-    exchange: Literal["point", "hermite", "waveform"] | None = None
+    exchange: Choice | None = None
     tolerances: dict[str, Positive] = {}
     estimate: Literal["finer", "coarser", "none"] = "finer"
     timeout: Annotated[Positive | None, In("s")] = None
@@ -137,7 +138,7 @@ class Component(Section):
     @model_validator(mode="after")
     def _one_source(self) -> Component:
         if (self.model is None) == (self.fmu is None):
-            raise ValueError(f'give either fmu = "FILE.fmu" or model = one of {", ".join(vocabulary.MODELS)}')
+            raise ValueError(f'give either fmu = "FILE.fmu" or model = one of {", ".join(registry.names())}')
         return self
 
 
