@@ -1,5 +1,6 @@
 """The catalogue of robots: numbers by hand, and what is said about faulty files."""
 
+import contextlib
 import math
 
 import pytest
@@ -187,6 +188,32 @@ def test_two_robots_of_one_name_have_an_fmu_each(tmp_path, monkeypatch):
     first, second = robot_fmu(one), robot_fmu(other)
     masses = [of_fmu(path)["mass"].start for path in (first, second, robot_fmu(one))]
     assert first != second and masses == [38.0, 76.0, 38.0]
+
+
+ODD = [
+    "3",
+    "-1.5",
+    '"x"',
+    "[1]",
+    "{}",
+    "nan",
+    f"1{'0' * 400}",
+    "{ value = 3 }",
+    "{ a = 1 }",
+    "{ value = 1.0, unit = 3 }",
+]
+ODD += ['{ value = { a = 1 }, unit = "kg" }', f'{{ value = 1{"0" * 400}, unit = "kg", source = "x" }}']
+
+
+@pytest.mark.parametrize("place", ["title", "body", "body.mass", "body.inertia", "body.inertia.xx", "contact", "wheel"])
+def test_nothing_in_a_file_ends_in_a_traceback(tmp_path, place):
+    """Not in the file, and not in one that extends it with another mass."""
+    for odd in ODD:
+        path = written(tmp_path, f'extends = "fptlir"\n{place} = {odd}', "base.toml")
+        heavier = written(tmp_path, f'extends = "base.toml"\n{MASS}')
+        for file in (path, heavier):
+            with contextlib.suppress(InputError):
+                assert load_robot(file).parameters["mass"] > 0.0
 
 
 # -- a faulty file in the catalogue ------------------------------------------------------------------------------

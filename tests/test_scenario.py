@@ -1,18 +1,21 @@
 """Scenario files: what they may say, and what is said of a wrong one."""
 
+import contextlib
 import hashlib
 import json
 import math
+import shutil
 from pathlib import Path
 
 import pytest
 
+from orchestrator.catalogue.library import robot_fmu
 from orchestrator.catalogue.new import write_new
 from orchestrator.catalogue.robot_spec import load_robot
 from orchestrator.catalogue.scenarios import find
 from orchestrator.coupling.errors import InputError
 from orchestrator.scenario.read import load
-from orchestrator.scenario.types import GraphScenario, LandingScenario
+from orchestrator.scenario.types import GraphScenario, LandingScenario, Scenario
 
 FOLDER = Path(__file__).resolve().parents[1] / "scenarios"
 LANDINGS = sorted(path for path in FOLDER.glob("*.toml") if path.stem != "oscillator")
@@ -128,6 +131,14 @@ def test_another_robot_and_another_master(file: Path):
         ("simulation.master=iqn_il", "simulation.master: no master 'iqn_il'; did you mean iqn_ils?"),
         ("master.tolerence=1e-6", "master.tolerence: unknown key for master iqn_ils; did you mean tolerance?"),
         ("master.tolerance=small", "master.tolerance: 'small' is not of type float"),
+        ("master.tolerance=0.0", "master.tolerance: 0.0 must be greater than 0"),
+        ("master.max_iterations=0", "master.max_iterations: 0 must be greater than 0"),
+        ("master.reuse=-1", "master.reuse: -1 must be at least 0"),
+        ("master.threshold=-1e-9", "master.threshold: -1e-09 must be at least 0"),
+        (
+            "cable.parameters.spectral_radius=1.5",
+            "cable.parameters.spectral_radius: 1.5 must be at least 0 and at most 1",
+        ),
         ("simulation.exchange=wave", "simulation.exchange: 'wave' must be 'point', 'hermite' or 'waveform'"),
         ("contact.parameters.exchange=wave", "contact.parameters.exchange: 'wave' is not one of"),
         ("robot.model=fptlr", "robot.model: no robot 'fptlr' in the catalogue; did you mean fptlir?"),
@@ -346,6 +357,59 @@ def test_components_of_a_graph_are_replaced_one_by_one(file: Path):
     assert scenario.components["right"] == base.components["right"] and scenario.connections == base.connections
 
 
+# -- whatever stands in a file -----------------------------------------------------------------------------------
+
+ODD = [
+    "3",
+    "-1.5",
+    "true",
+    '"x"',
+    "[1]",
+    "[]",
+    "{}",
+    "nan",
+    f"1{'0' * 400}",
+    "{ value = 3 }",
+    '{ unit = "m" }',
+    "{ a = 1 }",
+]
+ODD += ['{ value = "q", unit = "m" }', "{ value = 1.0, unit = 3 }", "{ value = { a = 1 } }"]
+ODD += [f'{{ value = 1{"0" * 400}, unit = "km" }}']
+PLACES = [
+    *("title", "extends", "simulation", "simulation.master", "simulation.stop_time", "simulation.tolerances", "master"),
+    *("master.tolerance", "cable", "cable.fmu", "cable.parameters", "cable.parameters.span", "robot", "robot.model"),
+    *(
+        "robot.parameters",
+        "robot.parameters.mass",
+        "contact",
+        "landing",
+        "landing.position",
+        "components",
+        "connections",
+    ),
+]
+WELL = """title = 'A'
+simulation = { stop_time = 1.0, macro_step = 0.005 }
+robot = { model = 'fptlir' }
+landing.position = 20.0
+"""
+
+
+@pytest.mark.parametrize("place", PLACES)
+def test_nothing_in_a_file_ends_in_a_traceback(tmp_path: Path, place: str):
+    """A scenario, or an `InputError`: of the file itself, and of one that extends it and names another robot."""
+    section = place.partition(".")[0]
+    for odd in ODD:
+        kept = [line for line in WELL.splitlines() if not line.startswith(section)]
+        (tmp_path / "a.toml").write_text(
+            "\n".join(["cable = {}" if section != "cable" else "", *kept, f"{place} = {odd}"])
+        )
+        (tmp_path / "b.toml").write_text('extends = "a.toml"\nrobot.model = "linedrone"\nsimulation.master = "aitken"')
+        for name in ("a.toml", "b.toml"):
+            with contextlib.suppress(InputError):
+                assert isinstance(load(tmp_path / name), Scenario)
+
+
 # -- names -------------------------------------------------------------------------------------------------------
 
 
@@ -448,6 +512,22 @@ def test_nothing_is_scaled_for_the_robot_s_own_mass(file: Path):
     assert (
         isinstance(scenario, LandingScenario) and scenario.robot.parameters == {"mass": 38.0} and scenario.notes == ()
     )
+
+
+def test_inertia_of_a_foreign_fmu_is_not_scaled(file: Path, tmp_path: Path):
+    fmu = shutil.copy(robot_fmu(load_robot("fptlir")), tmp_path / "theirs.fmu")
+    replaced(file, "parameters.inertia.xx = 6.0", "")
+    scenario = load(file, ["robot.parameters.mass=55.0"], robot=str(fmu))
+    assert isinstance(scenario, LandingScenario) and scenario.robot.parameters == {"mass": 55.0}
+    assert scenario.notes == (
+        "robot.parameters.mass: the inertia of theirs.fmu is not scaled with the mass; give inertia.* as well",
+    )
+
+
+def test_bounds_of_a_foreign_fmu_are_kept(file: Path, tmp_path: Path):
+    fmu = shutil.copy(robot_fmu(load_robot("fptlir")), tmp_path / "theirs.fmu")
+    (found,) = problems(replaced(file, "parameters.inertia.xx = 6.0", ""), "robot.parameters.mass=-1.0", robot=str(fmu))
+    assert found.startswith("--set: robot.parameters.mass: -1.0 must be at least ")
 
 
 # -- a robot of one's own ----------------------------------------------------------------------------------------

@@ -137,7 +137,7 @@ def convert(value: float, given: str, wanted: str) -> float:
     if one is None or other is None or one.exponents != other.exponents:
         raise UnitError(f"unit {given!r} does not fit; possible here: {', '.join(alternatives(wanted))}")
     ratio = one.factor / other.factor
-    if ratio == 1 or not math.isfinite(value):
+    if ratio == 1 or not abs(value) <= LARGEST:  # nor is NaN
         return value
     exact = Fraction(repr(value)) * ratio
     return float(exact) if abs(exact) <= LARGEST else math.copysign(math.inf, value)

@@ -224,10 +224,10 @@ def _with_scaled_inertia(below: Document, above: Document) -> Document:
         return above
     try:
         ratio = _mass(here) / _mass(there)
-    except (TypeError, KeyError, ValueError, ZeroDivisionError):
+        inertia = {axes: _scaled(moment, ratio) for axes, moment in there["inertia"].items()}
+    except (TypeError, KeyError, ValueError, AttributeError, ArithmeticError):
         return above
-    inertia = there.get("inertia", {})
-    return above | {"body": here | {"inertia": {axes: _scaled(moment, ratio) for axes, moment in inertia.items()}}}
+    return above | {"body": here | {"inertia": inertia}}
 
 
 def _scaled(moment: Any, ratio: float) -> Any:

@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+import sys
 from collections.abc import Iterator, Mapping
 from dataclasses import replace
 from pathlib import Path
@@ -19,6 +20,7 @@ from orchestrator.scenario.types import DEFAULT_MASTER, UNITS, Provenance
 
 Known = Mapping[str, Mapping[str, Variable]]
 """Section → its variables by name."""
+LARGEST = sys.float_info.max
 GROUPS = {"parameters": "parameter", "inputs": "input"}
 """Table of a section → causality of the variables that it sets."""
 
@@ -66,7 +68,7 @@ def to_si(document: Document, known: Known, provenance: dict[str, Provenance], p
         if isinstance(value, dict):
             yield from to_si(value, known, provenance, f"{path}.")
             continue
-        given, wanted = provenance[path].unit, _unit_of(path, known)
+        given, wanted = provenance[path].unit if path in provenance else None, _unit_of(path, known)
         if given is None or wanted is None or given == wanted:
             continue
         try:
@@ -77,7 +79,7 @@ def to_si(document: Document, known: Known, provenance: dict[str, Provenance], p
 
 
 def _converted(value: Any, given: str, wanted: str) -> Any:
-    if _is_number(value):
+    if isinstance(value, int | float) and not isinstance(value, bool):
         return convert(value, given, wanted)
     raise UnitError(f"{value!r} is no number and has no unit")
 
@@ -125,7 +127,7 @@ def _value_problems(path: str, variable: Variable, value: Any) -> Iterator[Compl
     is_bool = isinstance(value, bool)
     if not isinstance(value, wanted) or is_bool != (variable.kind == "boolean"):
         yield Complaint(path, f"{value!r} is not of type {variable.kind}")
-    elif isinstance(value, float) and not abs(value) < float("inf"):
+    elif isinstance(value, int | float) and not abs(value) <= LARGEST:
         yield Complaint(path, f"{value!r} must be a finite number")
     elif variable.choices and value not in variable.choices:
         yield Complaint(path, f"{value!r} is not one of {', '.join(variable.choices)}")
@@ -139,7 +141,7 @@ def _master_problems(document: Document) -> Iterator[Complaint]:
     masters = master_options()
     if isinstance(name, str) and name not in masters:
         yield Complaint("simulation.master", f"no master {name!r}{nearest(name, masters)}")
-    for key, value in options.items() if name in masters else ():
+    for key, value in options.items() if isinstance(name, str) and name in masters else ():
         if key not in masters[name]:
             yield Complaint(f"master.{key}", f"unknown key for master {name}{nearest(key, masters[name])}")
         elif not _is_like(value, masters[name][key]):
@@ -168,7 +170,8 @@ def _step_problems(document: Document) -> Iterator[Complaint]:
 
 
 def _is_number(value: Any) -> TypeGuard[float]:
-    return isinstance(value, int | float) and not isinstance(value, bool)
+    """Whether `value` is a number that has a place among floats."""
+    return isinstance(value, float) or (type(value) is int and abs(value) <= LARGEST)
 
 
 def _position_problems(document: Document, known: Known) -> Iterator[Complaint]:

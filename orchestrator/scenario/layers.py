@@ -43,8 +43,9 @@ def lay(stack: Stack, above: Document, place: str) -> list[str]:
             notes += _left_behind(section, below)
             _drop(stack.document, section)
     simulation = above.get("simulation")
-    if isinstance(simulation, dict) and "master" in simulation:
-        _make_room_for_master(stack.document, bare(simulation["master"]))
+    master = bare(simulation.get("master")) if isinstance(simulation, dict) else None
+    if isinstance(master, str):
+        _make_room_for_master(stack.document, master)
     stack.put(above, place)
     return notes
 
@@ -77,7 +78,7 @@ def _is_another(below: Document, above: Document) -> bool:
 
 
 def _left_behind(place: tuple[str, ...], below: Document) -> Iterator[str]:
-    lost = [f"{group}.{name}" for group in ("parameters", "inputs") for name in below.get(group, {})]
+    lost = [f"{group}.{name}" for group in ("parameters", "inputs") for name in _table(below, (group,)) or {}]
     was = bare(below.get("model")) or bare(below.get("fmu"))
     if lost:
         whose = f"{was}'s" if was else "those of our own module"
@@ -91,7 +92,7 @@ def _drop(document: Document, place: tuple[str, ...]) -> None:
         del table[last]
 
 
-def _make_room_for_master(document: Document, master: Any) -> None:
+def _make_room_for_master(document: Document, master: str) -> None:
     simulation, options = (_table(document, (key,)) or {} for key in ("simulation", "master"))
     if bare(simulation.get("master", DEFAULT_MASTER)) != master:
         document["master"] = shared_options(options, master)
