@@ -11,9 +11,9 @@ from time import perf_counter
 
 import numpy as np
 
-from fmus.cable import dynamics
-from fmus.cable.assembly import Model, constrain_vector, iteration_matrix
+from fmus.cable.assembly import Model, constrain_vector, iteration_matrix, residual
 from fmus.cable.module import Cable
+from fmus.cable.state import Work, make_work
 from fmus.kernels import banded
 from fmus.kernels.jit import kernel
 from fmus.module.variables import Value
@@ -27,7 +27,7 @@ TARGET = 15.0
 def residuals(model, q, v, work, number):
     """Evaluate the residual of one stage a number of times."""
     for _ in range(number):
-        dynamics.residual(model, q, v, work.a[0], work.external, work.residual[0], work.axial, work.element)
+        residual(model, q, v, work.a[0], work.external, work.residual[0], work.axial, work.element)
         constrain_vector(model, work.residual[0])
 
 
@@ -54,7 +54,7 @@ def microseconds(call: Callable[[], object]) -> float:
 def main() -> None:
     cable = Cable()
     cable.initialize(0.0)
-    model, work = cable.model, dynamics.make_work(cable.model.weight.size, cable.state.size)
+    model, work = cable.model, make_work(cable.model.weight.size, cable.state.size)
     n, h = model.weight.size, 0.0025
     q, v = cable.state[:n].copy(), np.zeros(n)
     z = h * (0.25 + 0.14j)
@@ -74,7 +74,7 @@ def main() -> None:
         print(f"macro step of 5 ms, 2 inner  {_macro_step_time(integrator):6.1f} µs ({integrator}, all outputs)")
 
 
-def _matrix_time(model: Model, q: np.ndarray, v: np.ndarray, work: dynamics.Work) -> float:
+def _matrix_time(model: Model, q: np.ndarray, v: np.ndarray, work: Work) -> float:
     """Return the time to assemble and factorise the real iteration matrix, µs."""
 
     def make() -> None:

@@ -22,8 +22,9 @@ import numpy as np
 
 from fmus.face.first_use import compile_modules
 from fmus.kernels.jit import COMPILATION
+from orchestrator.catalogue.documents import read_once
 from orchestrator.coupling.errors import InputError, RunError, nearest
-from orchestrator.coupling.masters.options import master_options
+from orchestrator.coupling.masters import MASTERS
 from orchestrator.runs.compare import Comparison, compared
 from orchestrator.runs.coupled import run_coupled
 from orchestrator.runs.directory import RunDirectory, claimed
@@ -41,6 +42,7 @@ from orchestrator.runs.reference import solve_reference
 from orchestrator.runs.result import Run, Signal, run_label
 from orchestrator.runs.summary import result
 from orchestrator.runs.systems import System, resolve
+from orchestrator.scenario.layers import shared_options
 from orchestrator.scenario.read import load
 from orchestrator.scenario.types import LandingScenario, Scenario, ScenarioNote
 
@@ -113,10 +115,11 @@ def run(
     InputError : scenario or options are wrong, or `out` exists; nothing was run
     RunError : the run failed at its very start
     """
-    loaded = Changes(set, robot, master, macro_step, stop, timeout, estimate).of(scenario)
-    with _directory(out, loaded.name) as directory:
-        found = _run(_ready(loaded), progress or _silent)
-        return found if directory is None else write_run(directory, found, _draw(pictures))
+    with read_once():
+        loaded = Changes(set, robot, master, macro_step, stop, timeout, estimate).of(scenario)
+        with _directory(out, loaded.name) as directory:
+            found = _run(_ready(loaded), progress or _silent)
+            return found if directory is None else write_run(directory, found, _draw(pictures))
 
 
 def compare(
@@ -153,11 +156,12 @@ def compare(
     RunError : a run failed at its very start, or the reference did; the runs made so far are written if `out` is given
     """
     changes = Changes(set, robot, master, macro_step, stop, timeout)
-    first = changes.of(scenario)
-    variants = _variants(scenario, first, changes, masters, macro_steps)
-    with _directory(out, f"{first.name}-compare") as directory:
-        found = _compared(_ready(first), variants, progress or _silent, directory)
-        return found if directory is None else write_comparison(directory, found, _draw(pictures))
+    with read_once():
+        first = changes.of(scenario)
+        variants = _variants(scenario, first, changes, masters, macro_steps)
+        with _directory(out, f"{first.name}-compare") as directory:
+            found = _compared(_ready(first), variants, progress or _silent, directory)
+            return found if directory is None else write_comparison(directory, found, _draw(pictures))
 
 
 def load_scenario(
@@ -172,7 +176,8 @@ def load_scenario(
     estimate: str | None = None,
 ) -> Scenario:
     """Read and check a scenario, with other values as for `run`; `InputError` names all that is wrong with it."""
-    return Changes(set, robot, master, macro_step, stop, timeout, estimate).of(scenario)
+    with read_once():
+        return Changes(set, robot, master, macro_step, stop, timeout, estimate).of(scenario)
 
 
 @dataclass(frozen=True)
@@ -208,7 +213,10 @@ class Changes:
         simulation = {key.removeprefix("simulation."): value for key, value in self._simulation.items()}
         if self.master is None or self.master == scenario.simulation.master:
             return scenario.changed(**simulation)
-        return scenario.changed(_kept_options(scenario, self.master), exchange=None, master=self.master, **simulation)
+        if self.master not in MASTERS:
+            raise InputError(f"{scenario.name}: no master {self.master!r}{nearest(self.master, MASTERS)}")
+        options = shared_options(scenario.master, self.master)
+        return scenario.changed(options, exchange=None, master=self.master, **simulation)
 
 
 def _ready(scenario: Scenario) -> System:
@@ -216,14 +224,6 @@ def _ready(scenario: Scenario) -> System:
     if isinstance(scenario, LandingScenario):
         compile_modules()
     return resolve(scenario)
-
-
-def _kept_options(scenario: Scenario, master: str) -> dict[str, Any]:
-    """Return those options of the scenario's master that are also for another one: the tolerance."""
-    masters = master_options()
-    if master not in masters:
-        raise InputError(f"{scenario.name}: simulation.master: no master {master!r}{nearest(master, masters)}")
-    return {key: value for key, value in scenario.master.items() if key == "tolerance" and key in masters[master]}
 
 
 def _variants(

@@ -63,8 +63,39 @@ def test_help_names_every_command():
 
 def test_list_shows_scenarios_robots_and_masters():
     done = orchestrate("list")
-    names = [*vocabulary.robots(), *master_options(), *(p.name for p in (ROOT / "scenarios").glob("*.toml"))]
+    names = [*vocabulary.robots(), *master_options(), *(p.stem for p in (ROOT / "scenarios").glob("*.toml"))]
     assert done.returncode == 0 and all(name in done.stdout for name in names)
+
+
+def test_new_files_are_valid_and_never_overwritten(tmp_path: Path):
+    robot, scenario = tmp_path / "mine.toml", tmp_path / "line.toml"
+    assert orchestrate("new", "robot", robot).stdout == f"{robot}\n"
+    assert orchestrate("new", "scenario", tmp_path / "line").stdout == f"{scenario}\n"
+    done = orchestrate("validate", scenario, "--robot", robot)
+    assert done.returncode == 0 and done.stderr == "" and done.stdout.startswith(f"{scenario}: valid; 3 FMUs")
+    done = orchestrate("new", "scenario", scenario)
+    assert done.returncode == 2 and "exists already" in done.stderr
+
+
+def test_a_robot_s_file_gives_the_same_as_the_catalogue(landing_run, tmp_path: Path):
+    """By name, from another folder; a robot that changes nothing."""
+    (tmp_path / "same.toml").write_text('extends = "fptlir"')
+    arguments = ["run", LANDING.stem, "--robot", "same.toml", "--out", "out", "--stop", "0.05", "--quiet"]
+    done = subprocess.run([*COMMAND, *arguments], cwd=tmp_path, capture_output=True, text=True)
+    assert done.returncode == 0, done.stderr
+    ours, theirs = read_table(landing_run[1] / "results.csv"), read_table(tmp_path / "out" / "results.csv")
+    assert all(np.array_equal(ours[name], theirs[name]) for name in ours)
+    assert len(manifest(tmp_path / "out")["provenance"]["robot.model"]["sha256"]) == 64
+
+
+def test_another_mass_is_answered_once_with_its_inertia(tmp_path: Path):
+    mass = 'robot.parameters.mass={ value = 76000, unit = "g" }'
+    options = ["--out", tmp_path / "out", "--stop", 0.01, "--quiet", "--masters", "jacobi,gauss_seidel"]
+    done = orchestrate("compare", LANDING.stem, *options, "--set", mass)
+    assert done.returncode in (0, 1), done.stderr
+    assert done.stderr.count("robot.parameters.mass: inertia scaled by 2 with the mass") == 1
+    resolved = manifest(tmp_path / "out" / "jacobi_0.005s")["resolved"]["robot"]["parameters"]
+    assert resolved["mass"] == 76.0 and resolved["inertia.zz"] == 17.0
 
 
 @pytest.mark.parametrize("command", ["run", "compare", "validate"])

@@ -8,9 +8,11 @@ from scipy.integrate import solve_ivp
 from scipy.optimize import brentq
 from scipy.spatial.transform import Rotation
 
-from fmus.contact import exchange
-from fmus.contact.law import LEFT, OPEN, OUT_SIZE, SLIP, STICK, contact_wrench
+from fmus.contact import places as at
+from fmus.contact.law import LEFT, OPEN, SLIP, STICK, contact_wrench
 from fmus.contact.module import Contact
+from fmus.contact.path import motion_at, waveform_path
+from fmus.contact.sampling import gauss_rule, sample_law
 from fmus.module.variables import ModuleError
 
 HALF = math.radians(50.0)
@@ -42,31 +44,38 @@ def seated(depth=0.0, **settings):
 
 
 def rule(m):
-    return (*exchange.gauss_rule(m), np.zeros((m + 1, 24)), np.zeros((m + 1, OUT_SIZE)))
+    return (*gauss_rule(m), np.zeros((m + 1, at.MOTION_SIZE)), np.zeros((m + 1, at.OUT_SIZE)))
+
+
+def triples(rows, first):
+    """The three columns from `first` on of the eight Gauss points."""
+    return rows[:8, first : first + 3]
 
 
 def random_inputs(rng, size=1e-3):
     """A start motion and inputs (45,) that differ from it by about `size`."""
     start = np.zeros(24)
-    start[4], start[14], start[15] = 1.0, SEAT - 3e-3, 1.0
+    start[at.TANGENT + 1], start[at.CENTRE + 2], start[at.AXLE] = 1.0, SEAT - 3e-3, 1.0
     inputs = np.zeros(45)
-    inputs[:24] = start
-    inputs[:24] += size * rng.normal(size=24)
+    inputs[: at.MEANS] = start
+    inputs[: at.MEANS] += size * rng.normal(size=24)
     for j, i in enumerate((0, 1, 2, 3, 4, 5, 12, 13, 14, 15, 16, 17)):
         inputs[24 + j] = 0.5 * (start[i] + inputs[i]) + 0.1 * size * rng.normal()
-    inputs[36:39] = size * rng.normal(size=3)
-    inputs[39:42] = 0.5 * inputs[36:39] + 0.1 * size * rng.normal(size=3)
+    inputs[at.ROTATION : at.ROTATION_MEAN] = size * rng.normal(size=3)
+    turn = inputs[at.ROTATION : at.ROTATION_MEAN]
+    inputs[at.ROTATION_MEAN : at.CURVATURE] = 0.5 * turn + 0.1 * size * rng.normal(size=3)
     return start, inputs
 
 
 def rigid_inputs(rng, size=1e-3):
     """As `random_inputs`, but the axle turns with the wheel's (constant) angular velocity."""
     start, inputs = random_inputs(rng, size)
-    turn = inputs[36:39]
-    inputs[39:42] = 0.5 * turn
-    inputs[15:18] = Rotation.from_rotvec(turn).apply(start[15:18])
-    middle = Rotation.from_rotvec(0.5 * turn).apply(start[15:18])
-    inputs[33:36] = (start[15:18] + 4.0 * middle + inputs[15:18]) / 6.0
+    turn = inputs[at.ROTATION : at.ROTATION_MEAN]
+    inputs[at.ROTATION_MEAN : at.CURVATURE] = 0.5 * turn
+    before, after = start[at.AXLE : at.CENTRE_RATE], inputs[at.AXLE : at.CENTRE_RATE]
+    after[:] = Rotation.from_rotvec(turn).apply(before)
+    middle = Rotation.from_rotvec(0.5 * turn).apply(before)
+    inputs[at.MEANS + 9 : at.ROTATION] = (before + 4.0 * middle + after) / 6.0
     return start, inputs
 
 
@@ -74,16 +83,14 @@ def sampled(contact, start, inputs, h, m=8):
     """The law on the waveform path: nodes, weights, motions, samples, dissipation, stored energy before."""
     nodes, weights, increments, motions, samples = rule(m)
     path = np.zeros((4, 15))
-    exchange.waveform_path(start, inputs, path)
-    end, first, z = np.zeros(24), np.zeros(OUT_SIZE), np.zeros(2)
-    exchange.motion_at(path, 1.0, h, end)
-    exchange.motion_at(path, 0.0, h, motions[0])
+    waveform_path(start, inputs, path)
+    end, first, z = np.zeros(24), np.zeros(at.OUT_SIZE), np.zeros(2)
+    motion_at(path, 1.0, h, end)
+    motion_at(path, 0.0, h, motions[0])
     contact_wrench(contact._prm, motions[0], z, first)
-    status, lost = exchange.sample_law(
-        contact._prm, path, h, nodes, weights, increments, end, np.zeros(3), z, motions, samples
-    )
+    status, lost = sample_law(contact._prm, path, h, nodes, weights, increments, end, np.zeros(3), z, motions, samples)
     assert status == 0
-    return nodes, weights, motions, samples, lost, first[25] + first[26]
+    return nodes, weights, motions, samples, lost, first[at.WALL_ENERGY] + first[at.BRISTLE_ENERGY]
 
 
 @pytest.mark.parametrize("seed", range(5))
@@ -94,25 +101,28 @@ def test_work_booked_is_the_work_of_the_law(seed):
     start, inputs = random_inputs(np.random.default_rng(seed))
     _, weights, motions, samples, *_ = sampled(contact, start, inputs, h)
     w = h * weights
-    law_wheel = w @ np.sum(samples[:8, 6:9] * motions[:8, 18:21] + samples[:8, 9:12] * motions[:8, 21:24], axis=1)
-    turn = np.cross(motions[:8, 3:6], motions[:8, 9:12]) / np.sum(motions[:8, 3:6] ** 2, axis=1)[:, None]
-    law_push = w @ np.sum(samples[:8, 0:3] * motions[:8, 6:9], axis=1)
-    law_turn = w @ np.sum(samples[:8, 3:6] * turn, axis=1)
+    force, moment = triples(samples, at.WHEEL_FORCE), triples(samples, at.WHEEL_MOMENT)
+    speeds = force * triples(motions, at.CENTRE_RATE), moment * triples(motions, at.TURN_RATE)
+    law_wheel = w @ np.sum(speeds[0] + speeds[1], axis=1)
+    tangent = triples(motions, at.TANGENT)
+    turn = np.cross(tangent, triples(motions, at.TANGENT_RATE)) / np.sum(tangent**2, axis=1)[:, None]
+    law_push = w @ np.sum(triples(samples, at.CABLE_FORCE) * triples(motions, at.POINT_RATE), axis=1)
+    law_turn = w @ np.sum(triples(samples, at.CABLE_MOMENT) * turn, axis=1)
 
-    contact.state[:24] = start
+    contact.state[: at.MOTION_SIZE] = start
     contact.values[contact._INPUTS] = inputs
     contact.step(0.0, h)
     # round-off: some ulp of the positions (0.05 m) times the force; the turn: |t| changes by 1e-3
-    turned = w @ np.abs(np.sum(samples[:8, 3:6] * turn, axis=1))
-    roundoff = 1e-16 * np.max(np.abs(samples[:8, :12]))
+    turned = w @ np.abs(np.sum(triples(samples, at.CABLE_MOMENT) * turn, axis=1))
+    roundoff = 1e-16 * np.max(np.abs(samples[:8, : at.NORMAL]))
     assert read(contact, "work_wheel") == pytest.approx(law_wheel, abs=roundoff)
     assert read(contact, "work_cable") == pytest.approx(law_push + law_turn, abs=1e-3 * turned)
     # translation alone: keep the tangent
-    inputs[3:6] = inputs[27:30] = start[3:6]
+    inputs[at.TANGENT : at.POINT_RATE] = inputs[at.MEANS + 3 : at.MEANS + 6] = start[at.TANGENT : at.POINT_RATE]
     _, _, motions, samples, *_ = sampled(contact, start, inputs, h)
-    law_push = w @ np.sum(samples[:8, 0:3] * motions[:8, 6:9], axis=1)
+    law_push = w @ np.sum(triples(samples, at.CABLE_FORCE) * triples(motions, at.POINT_RATE), axis=1)
     contact.initialize(0.0)
-    contact.state[:24] = start
+    contact.state[: at.MOTION_SIZE] = start
     contact.values[contact._INPUTS] = inputs
     contact.step(0.0, h)
     assert read(contact, "work_cable") == pytest.approx(law_push, abs=roundoff)
@@ -141,7 +151,7 @@ def test_energy_balance_of_the_law_along_a_path(friction):
 @pytest.mark.parametrize("n", [2, 8, 40])
 def test_gauss_rule_integrates_between_its_nodes(n):
     """Exact for polynomials up to degree n - 1, and well conditioned."""
-    nodes, weights, increments = exchange.gauss_rule(n)
+    nodes, weights, increments = gauss_rule(n)
     ends = np.append(nodes, 1.0)
     for degree in (0, n // 2, n - 1):
         integrals = np.cumsum(increments @ nodes**degree)
@@ -205,20 +215,26 @@ LINEAR = {
 
 @pytest.mark.parametrize("omega_h", [0.1, 1.0, 3.0, 10.0, 1000.0])
 def test_waveform_is_unconditionally_stable(omega_h):
-    """The amplification matrix of an undamped linear oscillator has both eigenvalues on the unit circle."""
+    """The amplification matrix of an undamped linear oscillator has both eigenvalues on the unit circle.
+
+    Columns are differences of motions moved so little that the contact stays closed within the step, at a tenth of the
+    depth. Rounding of the wheel's place, half an ulp of 5 cm, moves the mass by (omega h)² times as much.
+    """
     stiffness = 2.0 * 1e6 * SIN**2
     h = 5e-3
     mass = stiffness * h**2 / omega_h**2
     depth = 2e-3
+    moved = 0.1 * depth / max(1.0, omega_h)
     columns = []
-    for dx, dv in ((0.0, 0.0), (1e-7, 0.0), (0.0, 1e-7 * omega_h / h)):
+    for dx, dv in ((0.0, 0.0), (moved, 0.0), (0.0, moved * omega_h / h)):
         contact = seated(depth - dx, **LINEAR)
         find = np.array([stiffness * depth, 0.0])
         x, v = coupled_step(contact, SEAT - depth + dx, dv, h, mass, -stiffness * depth, find)
-        columns.append(np.array([x - SEAT + depth, v * h / omega_h]) / 1e-7)
+        columns.append(np.array([x - SEAT + depth, v * h / omega_h]) / moved)
     matrix = np.column_stack([columns[1] - columns[0], columns[2] - columns[0]])
-    np.testing.assert_allclose(np.abs(np.linalg.eigvals(matrix)), 1.0, atol=2e-6)
-    assert np.linalg.det(matrix) == pytest.approx(1.0, abs=2e-6)
+    left = 1e-10 + 3.5e-18 * omega_h**2 / moved  # Newton's method stops at 1e-12
+    np.testing.assert_allclose(np.abs(np.linalg.eigvals(matrix)), 1.0, rtol=0.0, atol=left)
+    assert np.linalg.det(matrix) == pytest.approx(1.0, abs=left)
 
 
 def fall(exchange_name, steps, settings, speed=0.3, time=0.04):
@@ -228,7 +244,7 @@ def fall(exchange_name, steps, settings, speed=0.3, time=0.04):
     load, h = -read(contact, "wheel.force")[2], time / steps
     x, v, find = SEAT - depth, -speed, np.array([-load, 0.0])
     write(contact, "wheel.velocity", (0.0, 0.0, v))
-    contact.state[20] = v
+    contact.state[at.CENTRE_RATE + 2] = v
     for _ in range(steps):
         x, v = coupled_step(contact, x, v, h, 38.0, load, find)
     return x, v, load, contact
@@ -240,13 +256,13 @@ def test_order_of_the_exchange(name, order):
     settings = {"friction_coefficient": 0.0}
     base = 8 if order > 1 else 128
     runs = [fall(name, n, settings) for n in (base, 2 * base)]
-    prm, out = runs[0][3]._prm, np.zeros(32)
+    prm, out = runs[0][3]._prm, np.zeros(at.OUT_SIZE)
 
     def motion(t, y):
         m = np.zeros(24)
-        m[4], m[14], m[15], m[20] = 1.0, y[0], 1.0, y[1]
+        m[at.TANGENT + 1], m[at.CENTRE + 2], m[at.AXLE], m[at.CENTRE_RATE + 2] = 1.0, y[0], 1.0, y[1]
         contact_wrench(prm, m, np.zeros(2), out)
-        return y[1], (out[8] + runs[0][2]) / 38.0
+        return y[1], (out[at.WHEEL_FORCE + 2] + runs[0][2]) / 38.0
 
     exact = solve_ivp(motion, (0.0, 0.04), [SEAT - 4e-3, -0.3], rtol=1e-11, atol=1e-14, method="DOP853")
     errors = [abs(x - exact.y[0, -1]) for x, *_ in runs]
@@ -274,7 +290,7 @@ def test_interface_keeps_energy_over_many_steps():
 def bounce(h, speed):
     """Drop 38 kg at `speed` from 0.1 mm above a point contact; return it and the speed of departure."""
     contact = seated(-1e-4, max_contact_length=1e-7, friction_coefficient=0.0)
-    contact.state[20] = -speed
+    contact.state[at.CENTRE_RATE + 2] = -speed
     x, v, find, steps = SEAT + 1e-4, -speed, np.zeros(2), 0
     while x < SEAT or steps < 2:
         x, v = coupled_step(contact, x, v, h, 38.0, 0.0, find)
@@ -303,7 +319,7 @@ def slide(contact, way, steps, h=1e-3, direction=(0.0, 1.0, 0.0)):
     """Move the wheel by `way` at constant speed, all means consistent."""
     velocity = np.array(direction) * way / (steps * h)
     position = read(contact, "wheel.position")
-    contact.state[18:21] = velocity
+    contact.state[at.CENTRE_RATE : at.TURN_RATE] = velocity
     for _ in range(steps):
         write(contact, "wheel.position_mean", position + velocity * h / 2)
         position = position + velocity * h
@@ -329,7 +345,7 @@ def test_sticks_without_creep_then_slides_at_the_limit(name):
     held = None
     write(contact, "wheel.velocity", (0.0, 0.0, 0.0))
     write(contact, "wheel.position_mean", read(contact, "wheel.position"))
-    contact.state[18:21] = 0.0
+    contact.state[at.CENTRE_RATE : at.TURN_RATE] = 0.0
     for i in range(1000):
         move_cable(contact)
         contact.step(0.0, 1e-3)
@@ -507,7 +523,7 @@ def test_hermite_does_without_means_and_rotation():
     contact = seated(4e-3, exchange="hermite", max_contact_length=1e-3, tangential_damping=0.0)
     omega = np.array([1e-2, 0.0, 0.0])
     write(contact, "wheel.angular_velocity", omega)
-    contact.state[21:24] = omega
+    contact.state[at.TURN_RATE : at.MOTION_SIZE] = omega
     for _ in range(5):
         contact.step(0.0, 1e-3)
     # the wheel's lowest point moves by omega x (-z) = +y: the cable is dragged along
@@ -517,9 +533,9 @@ def test_hermite_does_without_means_and_rotation():
 
 
 def walls_energy(contact):
-    out = np.zeros(OUT_SIZE)
+    out = np.zeros(at.OUT_SIZE)
     contact_wrench(contact._prm, contact.values[contact._INPUTS][:24].copy(), np.zeros(2), out)
-    return out[25]
+    return out[at.WALL_ENERGY]
 
 
 def test_step_length_is_checked():

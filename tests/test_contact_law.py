@@ -10,6 +10,7 @@ from scipy.integrate import quad, quad_vec, solve_ivp
 from scipy.optimize import brentq
 from scipy.spatial.transform import Rotation
 
+from fmus.contact import places as at
 from fmus.contact.law import LEFT, NODES, OPEN, SLIP, STICK, contact_wrench, law_parameters
 from fmus.contact.module import Contact
 
@@ -27,17 +28,17 @@ def parameters(**settings):
 
 def wheel_above(depth=0.0, lateral=0.0, velocity=(0.0, 0.0, 0.0), slip_rate=(0.0, 0.0)):
     """A level cable along +Y under a wheel whose centre is `depth` (m) below first touch of the groove."""
-    motion = np.zeros(24)
-    motion[4] = 1.0
-    motion[12:15] = -lateral, 0.0, SEAT - depth
-    motion[15] = 1.0
-    motion[18:21] = velocity
-    motion[7], motion[6] = slip_rate
+    motion = np.zeros(at.MOTION_SIZE)
+    motion[at.TANGENT + 1] = 1.0
+    motion[at.CENTRE : at.AXLE] = -lateral, 0.0, SEAT - depth
+    motion[at.AXLE] = 1.0
+    motion[at.CENTRE_RATE : at.TURN_RATE] = velocity
+    motion[at.POINT_RATE + 1], motion[at.POINT_RATE] = slip_rate
     return motion
 
 
 def wrench(motion, slip=(0.0, 0.0), **settings):
-    out = np.zeros(32)
+    out = np.zeros(at.OUT_SIZE)
     assert contact_wrench(parameters(**settings), motion, np.array(slip, float), out) == 0
     return out
 
@@ -45,11 +46,11 @@ def wrench(motion, slip=(0.0, 0.0), **settings):
 def random_motion(rng, depth=None):
     """A cable and a wheel in a random, but plausible pose; the offset from p is some centimetres."""
     motion = wheel_above(rng.uniform(-1e-3, 6e-3) if depth is None else depth, rng.uniform(-3e-3, 3e-3))
-    motion[0:3] += 0.03 * rng.normal() * motion[3:6]
+    motion[at.POINT : at.TANGENT] += 0.03 * rng.normal() * motion[at.TANGENT : at.POINT_RATE]
     yaw = Rotation.from_rotvec([0.02 * rng.normal(), 0.02 * rng.normal(), 0.05 * rng.normal()])
-    motion[3:6] = yaw.apply(motion[3:6]) * rng.uniform(0.99, 1.01)
-    motion[6:12] = 0.3 * rng.normal(size=6)
-    motion[18:24] = 0.3 * rng.normal(size=6)
+    motion[at.TANGENT : at.POINT_RATE] = yaw.apply(motion[at.TANGENT : at.POINT_RATE]) * rng.uniform(0.99, 1.01)
+    motion[at.POINT_RATE : at.CENTRE] = 0.3 * rng.normal(size=6)
+    motion[at.CENTRE_RATE : at.MOTION_SIZE] = 0.3 * rng.normal(size=6)
     return turned(motion, Rotation.from_rotvec(rng.normal(size=3)))
 
 
@@ -88,11 +89,11 @@ def test_seat_depth_of_a_point_contact():
     weight = 38.0 * 9.8
     delta = (weight / (2.0 * 1e8 * SIN)) ** (1 / 2.5)
     out = wrench(wheel_above(delta / SIN), max_contact_length=1e-7)
-    assert out[8] == pytest.approx(weight, rel=1e-9)
-    assert out[2] == pytest.approx(-weight, rel=1e-9)
-    assert out[12] == pytest.approx(weight / SIN, rel=1e-9)
-    assert out[15] == pytest.approx(delta, rel=1e-12)
-    assert out[25] == pytest.approx(2.0 * 1e8 * delta**3.5 / 3.5, rel=1e-9)
+    assert out[at.WHEEL_FORCE + 2] == pytest.approx(weight, rel=1e-9)
+    assert out[at.CABLE_FORCE + 2] == pytest.approx(-weight, rel=1e-9)
+    assert out[at.NORMAL] == pytest.approx(weight / SIN, rel=1e-9)
+    assert out[at.DEEPEST] == pytest.approx(delta, rel=1e-12)
+    assert out[at.WALL_ENERGY] == pytest.approx(2.0 * 1e8 * delta**3.5 / 3.5, rel=1e-9)
 
 
 @pytest.mark.parametrize("seed", range(12))
@@ -102,9 +103,9 @@ def test_walls_against_adaptive_quadrature(seed):
     out = wrench(motion, friction_coefficient=0.0)
     expected = reference_walls(motion)
     scale = expected[6]
-    np.testing.assert_allclose(out[0:3], expected[0:3], atol=4e-6 * scale + 1e-12)
-    np.testing.assert_allclose(out[3:6], expected[3:6], atol=4e-6 * 0.06 * scale + 1e-12)
-    assert out[12] == pytest.approx(scale, rel=4e-6, abs=1e-12)
+    np.testing.assert_allclose(out[at.CABLE_FORCE : at.CABLE_MOMENT], expected[0:3], atol=4e-6 * scale + 1e-12)
+    np.testing.assert_allclose(out[at.CABLE_MOMENT : at.WHEEL_FORCE], expected[3:6], atol=4e-6 * 0.06 * scale + 1e-12)
+    assert out[at.NORMAL] == pytest.approx(scale, rel=4e-6, abs=1e-12)
 
 
 @pytest.mark.parametrize(
@@ -123,25 +124,25 @@ def test_contact_length_is_that_of_the_geometry_and_grows():
     """delta = 0 where the radial distance is that of first touch: x^2 + rho_0^2 = SEAT^2."""
     lengths = []
     for depth in (1e-4, 1e-3, 3e-3):
-        lengths.append(wrench(wheel_above(depth))[18])
+        lengths.append(wrench(wheel_above(depth))[at.CONTACT_LENGTH])
         assert lengths[-1] == pytest.approx(2.0 * math.sqrt(SEAT**2 - (SEAT - depth) ** 2), rel=1e-9)
     assert lengths == sorted(lengths)
-    assert wrench(wheel_above(0.02))[18] == pytest.approx(0.06, rel=1e-12)
-    assert wrench(wheel_above(-1e-9))[18] == 0.0
+    assert wrench(wheel_above(0.02))[at.CONTACT_LENGTH] == pytest.approx(0.06, rel=1e-12)
+    assert wrench(wheel_above(-1e-9))[at.CONTACT_LENGTH] == 0.0
 
 
 def test_lateral_self_centring():
     """Small lateral offset y of a point contact: F_y = -2 n k delta^(n-1) cos^2(theta/2) y on the cable."""
     delta, y = 4e-3, 1e-7
     out = wrench(wheel_above(delta / SIN, lateral=y), max_contact_length=1e-7, friction_coefficient=0.0)
-    assert out[0] == pytest.approx(-2.0 * 2.5 * 1e8 * delta**1.5 * COS**2 * y, rel=1e-6)
+    assert out[at.CABLE_FORCE] == pytest.approx(-2.0 * 2.5 * 1e8 * delta**1.5 * COS**2 * y, rel=1e-6)
 
 
 def test_yaw_restoring_moment():
     """Small yaw psi: the walls' difference over x and the radial forces at the lever psi x turn back."""
     depth, psi, k, l0 = 3e-3, 1e-6, 1e8, 0.06
     motion = wheel_above(depth)
-    motion[3:6] = math.sin(psi), math.cos(psi), 0.0  # right-handed turn about z is -psi
+    motion[at.TANGENT : at.POINT_RATE] = math.sin(psi), math.cos(psi), 0.0  # right-handed turn about z is -psi
 
     def stiffness(x):
         rho = math.hypot(SEAT - depth, x)
@@ -150,7 +151,7 @@ def test_yaw_restoring_moment():
 
     end = math.sqrt(SEAT**2 - (SEAT - depth) ** 2)
     expected = quad(stiffness, -end, end, epsabs=0.0, epsrel=1e-10)[0]
-    assert wrench(motion, friction_coefficient=0.0)[5] == pytest.approx(expected * psi, rel=1e-4)
+    assert wrench(motion, friction_coefficient=0.0)[at.CABLE_MOMENT + 2] == pytest.approx(expected * psi, rel=1e-4)
 
 
 @pytest.mark.parametrize("seed", range(4))
@@ -164,8 +165,8 @@ def test_wall_force_is_the_gradient_of_the_wall_energy(seed):
         for h in (1e-6, -1e-6):
             moved = motion.copy()
             moved[i] += h
-            energies.append(wrench(moved, **settings)[25])
-        assert out[i] == pytest.approx(-(energies[0] - energies[1]) / 2e-6, abs=2e-5 * out[12])
+            energies.append(wrench(moved, **settings)[at.WALL_ENERGY])
+        assert out[i] == pytest.approx(-(energies[0] - energies[1]) / 2e-6, abs=2e-5 * out[at.NORMAL])
 
 
 @settings(max_examples=150, deadline=None)
@@ -174,14 +175,14 @@ def test_never_pulls_and_dissipates(seed, damping):
     rng = np.random.default_rng(seed)
     motion = random_motion(rng)
     out = wrench(motion, 1e-3 * rng.normal(size=2), damping=damping)
-    d = motion[0:3] - motion[12:15]
-    radial = d - (d @ motion[15:18]) * motion[15:18]
+    d = motion[at.POINT : at.TANGENT] - motion[at.CENTRE : at.AXLE]
+    radial = d - (d @ motion[at.AXLE : at.CENTRE_RATE]) * motion[at.AXLE : at.CENTRE_RATE]
     walls = wrench(motion, damping=damping, friction_coefficient=0.0)
-    assert out[12] >= 0.0
-    assert walls[0:3] @ radial >= -1e-9 * out[12]
-    assert out[23] >= 0.0
-    assert out[24] >= -1e-12 * out[12]
-    assert math.hypot(out[13], out[14]) <= 0.7 * out[12] * (1 + 1e-12)
+    assert out[at.NORMAL] >= 0.0
+    assert walls[at.CABLE_FORCE : at.CABLE_MOMENT] @ radial >= -1e-9 * out[at.NORMAL]
+    assert out[at.WALL_POWER] >= 0.0
+    assert out[at.FRICTION_POWER] >= -1e-12 * out[at.NORMAL]
+    assert math.hypot(out[at.FRICTION], out[at.FRICTION + 1]) <= 0.7 * out[at.NORMAL] * (1 + 1e-12)
 
 
 @settings(max_examples=200, deadline=None)
@@ -190,15 +191,21 @@ def test_any_pose_gives_finite_passive_forces(seed):
     """Wheels upside down, along the cable, through it: the law stays defined."""
     rng = np.random.default_rng(seed)
     motion = rng.normal(size=24)
-    motion[12:15] = motion[0:3] + 0.05 * rng.normal(size=3)
-    motion[15:18] /= np.linalg.norm(motion[15:18])
+    motion[at.CENTRE : at.AXLE] = motion[at.POINT : at.TANGENT] + 0.05 * rng.normal(size=3)
+    motion[at.AXLE : at.CENTRE_RATE] /= np.linalg.norm(motion[at.AXLE : at.CENTRE_RATE])
     if seed % 3 == 0:
-        motion[15:18] = motion[3:6] / np.linalg.norm(motion[3:6])
+        motion[at.AXLE : at.CENTRE_RATE] = motion[at.TANGENT : at.POINT_RATE] / np.linalg.norm(
+            motion[at.TANGENT : at.POINT_RATE]
+        )
     out = wrench(motion, 1e-3 * rng.normal(size=2))
     assert np.isfinite(out).all()
-    assert out[12] >= 0.0 and out[23] >= 0.0 and 0.0 <= out[18] <= 0.06 * (1 + 1e-12)
-    about_wheel = out[3:6] + np.cross(motion[0:3] - motion[12:15], out[0:3])
-    np.testing.assert_allclose(about_wheel + out[9:12], 0.0, atol=1e-12 * (out[12] + 1e-9))
+    assert out[at.NORMAL] >= 0.0 and out[at.WALL_POWER] >= 0.0 and 0.0 <= out[at.CONTACT_LENGTH] <= 0.06 * (1 + 1e-12)
+    about_wheel = out[at.CABLE_MOMENT : at.WHEEL_FORCE] + np.cross(
+        motion[at.POINT : at.TANGENT] - motion[at.CENTRE : at.AXLE], out[at.CABLE_FORCE : at.CABLE_MOMENT]
+    )
+    np.testing.assert_allclose(
+        about_wheel + out[at.WHEEL_MOMENT : at.NORMAL], 0.0, atol=1e-12 * (out[at.NORMAL] + 1e-9)
+    )
 
 
 @settings(max_examples=60, deadline=None)
@@ -208,10 +215,14 @@ def test_action_is_reaction(seed):
     rng = np.random.default_rng(seed)
     motion = random_motion(rng)
     out = wrench(motion, 1e-4 * rng.normal(size=2))
-    scale = out[12] + 1e-9
-    np.testing.assert_allclose(out[0:3] + out[6:9], 0.0, atol=1e-14 * scale)
-    about_wheel = out[3:6] + np.cross(motion[0:3] - motion[12:15], out[0:3])
-    np.testing.assert_allclose(about_wheel + out[9:12], 0.0, atol=1e-14 * scale)
+    scale = out[at.NORMAL] + 1e-9
+    np.testing.assert_allclose(
+        out[at.CABLE_FORCE : at.CABLE_MOMENT] + out[at.WHEEL_FORCE : at.WHEEL_MOMENT], 0.0, atol=1e-14 * scale
+    )
+    about_wheel = out[at.CABLE_MOMENT : at.WHEEL_FORCE] + np.cross(
+        motion[at.POINT : at.TANGENT] - motion[at.CENTRE : at.AXLE], out[at.CABLE_FORCE : at.CABLE_MOMENT]
+    )
+    np.testing.assert_allclose(about_wheel + out[at.WHEEL_MOMENT : at.NORMAL], 0.0, atol=1e-14 * scale)
 
 
 @settings(max_examples=60, deadline=None)
@@ -222,23 +233,25 @@ def test_turned_and_mirrored_motion_gives_turned_and_mirrored_wrench(seed):
     out = wrench(motion, slip)
     rotation = Rotation.from_rotvec(rng.normal(size=3))
     after = wrench(turned(motion, rotation), slip)
-    tolerance = 1e-9 * (1.0 + out[12])
-    np.testing.assert_allclose(after[:12], turned(out[:12], rotation), atol=tolerance)
-    np.testing.assert_allclose(after[12:27], out[12:27], atol=tolerance)
+    tolerance = 1e-9 * (1.0 + out[at.NORMAL])
+    np.testing.assert_allclose(after[: at.NORMAL], turned(out[: at.NORMAL], rotation), atol=tolerance)
+    np.testing.assert_allclose(after[at.NORMAL : at.SCRATCH], out[at.NORMAL : at.SCRATCH], atol=tolerance)
     # mirrored in x: polar vectors change x, axial vectors (moment, angular velocity) change y and z; the
     # mirrored axle -x is the same wheel as +x, which turns round the lateral bristle
     polar, axial = np.array([-1.0, 1.0, 1.0]), np.array([1.0, -1.0, -1.0])
     mirror = np.concatenate([polar, polar, polar, polar, polar, -polar, polar, axial])
     image = wrench(mirror * motion, slip * [1.0, -1.0])
-    np.testing.assert_allclose(image[:12], np.concatenate([polar, axial, polar, axial]) * out[:12], atol=tolerance)
-    assert image[14] == pytest.approx(-out[14], abs=tolerance)
+    np.testing.assert_allclose(
+        image[: at.NORMAL], np.concatenate([polar, axial, polar, axial]) * out[: at.NORMAL], atol=tolerance
+    )
+    assert image[at.FRICTION + 1] == pytest.approx(-out[at.FRICTION + 1], abs=tolerance)
 
 
 @pytest.mark.parametrize("length", [1e-7, 0.06])
 def test_smooth_at_touch(length):
     """C2 in the depth: force / depth^2 falls like depth^(1/2) or faster, so F'' starts at 0."""
     depths = np.array([1e-4, 1e-5, 1e-6])
-    forces = np.array([wrench(wheel_above(d), max_contact_length=length)[12] for d in depths])
+    forces = np.array([wrench(wheel_above(d), max_contact_length=length)[at.NORMAL] for d in depths])
     assert np.all(np.diff(np.log(forces)) / np.diff(np.log(depths)) >= 2.5 - 1e-3)
     assert wrench(wheel_above(-1e-12))[:12].any() == False  # noqa: E712
 
@@ -248,11 +261,11 @@ def test_restitution_of_hunt_crossley():
 
     For a point contact in the groove the walls' rate is sin(theta/2) of the radial speed: E = D sin(theta/2).
     """
-    prm, out, none = parameters(max_contact_length=1e-7, friction_coefficient=0.0), np.zeros(32), np.zeros(2)
+    prm, out, none = parameters(max_contact_length=1e-7, friction_coefficient=0.0), np.zeros(at.OUT_SIZE), np.zeros(2)
 
     def fall(t, x):
         contact_wrench(prm, wheel_above(x[0], velocity=(0.0, 0.0, -x[1])), none, out)
-        return x[1], -out[8] / 38.0
+        return x[1], -out[at.WHEEL_FORCE + 2] / 38.0
 
     def lift(t, x):
         return x[0] + 1e-15
@@ -268,41 +281,45 @@ def test_restitution_of_hunt_crossley():
 
 def test_friction_sticks_up_to_the_coulomb_limit():
     motion = wheel_above(4e-3)
-    limit = 0.7 * wrench(motion)[12]
+    limit = 0.7 * wrench(motion)[at.NORMAL]
     z = 0.6 * limit / 1e6
     out = wrench(motion, (z, -z))
-    assert out[19] == STICK
-    np.testing.assert_allclose(out[13:15], [-1e6 * z, 1e6 * z], rtol=1e-14)
-    np.testing.assert_array_equal(out[21:23], [z, -z])
+    assert out[at.STATUS] == STICK
+    np.testing.assert_allclose(out[at.FRICTION : at.DEEPEST], [-1e6 * z, 1e6 * z], rtol=1e-14)
+    np.testing.assert_array_equal(out[at.ELONGATION : at.WALL_POWER], [z, -z])
     out = wrench(motion, (3 * z, -3 * z))
-    assert out[19] == SLIP
-    assert math.hypot(out[13], out[14]) == pytest.approx(limit, rel=1e-14)
-    assert out[1] == pytest.approx(-limit / math.sqrt(2), rel=1e-12)
-    np.testing.assert_allclose(wrench(motion, out[21:23])[21:23], out[21:23], rtol=1e-15)
+    assert out[at.STATUS] == SLIP
+    assert math.hypot(out[at.FRICTION], out[at.FRICTION + 1]) == pytest.approx(limit, rel=1e-14)
+    assert out[at.CABLE_FORCE + 1] == pytest.approx(-limit / math.sqrt(2), rel=1e-12)
+    np.testing.assert_allclose(
+        wrench(motion, out[at.ELONGATION : at.WALL_POWER])[at.ELONGATION : at.WALL_POWER],
+        out[at.ELONGATION : at.WALL_POWER],
+        rtol=1e-15,
+    )
 
 
 def test_wedge_raises_sliding_friction():
     """Walls carry W = N sin(theta/2), friction is mu N: sliding takes mu / sin(theta/2) of the load."""
     motion = wheel_above(4e-3, slip_rate=(0.5, 0.0))
     out = wrench(motion, (1.0, 0.0), max_contact_length=1e-7, damping=0.0)
-    assert out[19] == SLIP
-    assert -out[1] / out[8] == pytest.approx(0.7 / SIN, rel=1e-9)
-    assert out[24] == pytest.approx(-out[1] * 0.5, rel=1e-12)
+    assert out[at.STATUS] == SLIP
+    assert -out[at.CABLE_FORCE + 1] / out[at.WHEEL_FORCE + 2] == pytest.approx(0.7 / SIN, rel=1e-9)
+    assert out[at.FRICTION_POWER] == pytest.approx(-out[at.CABLE_FORCE + 1] * 0.5, rel=1e-12)
 
 
 def test_no_force_no_friction():
     out = wrench(wheel_above(-1e-3, slip_rate=(1.0, 1.0)), (1e-3, 1e-3))
-    assert out[19] == OPEN
-    assert not out[0:15].any() and not out[21:27].any()
-    assert out[15] == pytest.approx(-1e-3 * SIN, rel=1e-9)
-    np.testing.assert_allclose(out[16:18], [1.0, 1.0])
+    assert out[at.STATUS] == OPEN
+    assert not out[at.CABLE_FORCE : at.DEEPEST].any() and not out[at.ELONGATION : at.SCRATCH].any()
+    assert out[at.DEEPEST] == pytest.approx(-1e-3 * SIN, rel=1e-9)
+    np.testing.assert_allclose(out[at.SLIP_VELOCITY : at.CONTACT_LENGTH], [1.0, 1.0])
 
 
 def test_offset_is_arc_length_of_the_foot():
     motion = wheel_above(2e-3)
-    motion[1] = 0.02
-    motion[4] = 1.01
-    assert wrench(motion)[20] == pytest.approx(-0.02 / 1.01, rel=1e-14)
+    motion[at.POINT + 1] = 0.02
+    motion[at.TANGENT + 1] = 1.01
+    assert wrench(motion)[at.OFFSET] == pytest.approx(-0.02 / 1.01, rel=1e-14)
 
 
 @pytest.mark.parametrize(
@@ -313,12 +330,12 @@ def test_leaving_the_groove(lateral, radial, status):
     """Beside the wheel and lower than a cable lying on the rim (75 + 9 mm): left; above the rim: open."""
     motion = wheel_above(SEAT - radial, lateral=lateral)
     out = wrench(motion)
-    assert out[19] == status
-    assert not out[0:12].any()
+    assert out[at.STATUS] == status
+    assert not out[at.CABLE_FORCE : at.NORMAL].any()
 
 
 def test_failure_is_told():
     for i, expected in ((4, 1), (15, 2), (12, 3)):
         motion = wheel_above(1e-3)
-        motion[i] = 0.0 if i != 12 else math.nan
-        assert contact_wrench(parameters(), motion, np.zeros(2), np.zeros(32)) == expected
+        motion[i] = 0.0 if i != at.CENTRE else math.nan
+        assert contact_wrench(parameters(), motion, np.zeros(2), np.zeros(at.OUT_SIZE)) == expected

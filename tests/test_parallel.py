@@ -67,21 +67,24 @@ def test_threads_are_used_and_end_with_the_run():
 
 @pytest.mark.skipif(processors() < 2, reason="one processor")
 def test_auto_uses_threads_for_long_steps_alone():
-    """Three steps that sleep for 4 ms: 12 ms one by one, 8 ms by two threads; nothing to win where a step takes 1 µs."""
+    """Three steps that sleep for 10 ms: 30 ms one by one, 20 ms by two threads; nothing to win where a step takes 1 µs.
+
+    A busy machine wakes sleepers late, but that slows both: two thirds of the time, held against nine tenths.
+    """
     counts, stamps = [], []
 
     def on_step(_: object) -> None:
         counts.append(threading.active_count())
         stamps.append(perf_counter())
 
-    before, long = threading.active_count(), {name: {"duration": 4e-3} for name in NAMES}
+    before, long = threading.active_count(), {name: {"duration": 10e-3} for name in NAMES}
     graph = lags(**long)
     log = simulate(graph, MASTERS["jacobi"](graph), 0.0, 0.2, 0.01, on_step=on_step)
     graph.close()
     assert log.error is None
     assert counts[0] == before < counts[-1]
     assert np.array_equal(log.values, run("jacobi", lags(), "never")[0].values)
-    assert np.median(np.diff(stamps)[-10:]) < 11e-3 < 12e-3 <= np.median(np.diff(stamps)[:4])
+    assert np.median(np.diff(stamps)[-10:]) < 0.9 * np.median(np.diff(stamps)[:4])
     graph = lags()
     simulate(graph, MASTERS["jacobi"](graph), 0.0, 0.2, 0.01, on_step=on_step)
     graph.close()

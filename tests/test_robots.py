@@ -5,7 +5,11 @@ import math
 import pytest
 
 from fmus.robot import Robot
+from orchestrator.catalogue import listing, robot_spec
+from orchestrator.catalogue.library import robot_fmu, robot_recipe
+from orchestrator.catalogue.modules import of_fmu
 from orchestrator.catalogue.robot_spec import FOLDER, catalogue, load_robot
+from orchestrator.cli.commands import main
 from orchestrator.coupling.errors import InputError
 
 CABLE_DIAMETER = 0.018
@@ -46,7 +50,18 @@ def test_fptlir_by_hand():
 def test_inertia_scales_with_the_mass(mass):
     light, standard = load_robot(f"fptlir_{mass}kg").parameters, load_robot("fptlir").parameters
     for name in ("mass", "inertia.xx", "inertia.yy", "inertia.zz"):
-        assert light[name] == pytest.approx(standard[name] * mass / 38.0, rel=1e-5)  # six digits in the file
+        assert light[name] == pytest.approx(standard[name] * mass / 38.0, rel=1e-14)  # a few roundings
+
+
+@pytest.mark.parametrize(
+    ("mass", "xx", "zz"), [(10, 1.52632, 2.23684), (55, 8.39474, 12.3026), (100, 15.2632, 22.3684)]
+)
+def test_scaled_inertia_is_that_of_the_paper(mass, xx, zz):
+    """Jia et al. 2025, section 4.4, vary the density; the numbers (about b) have six digits."""
+    inertia = load_robot(f"fptlir_{mass}kg").body.inertia
+    assert inertia.xx.value == inertia.yy.value == pytest.approx(xx, rel=5e-6)
+    assert inertia.zz.value == pytest.approx(zz, rel=5e-6)
+    assert inertia.zz.source == f"Jia et al. 2025, Table 1; scaled by {mass / 38:.6g} with the mass"
 
 
 def test_the_number_of_wheels_is_that_of_table_4():
@@ -100,3 +115,108 @@ def test_own_file_is_named_after_itself(tmp_path):
     path = tmp_path / "mine.toml"
     path.write_text((FOLDER / "fptlir.toml").read_text(encoding="utf-8"), encoding="utf-8")
     assert load_robot(path).name == "mine"
+
+
+# -- robots that build on others ---------------------------------------------------------------------------------
+
+MASS = 'body.mass = { value = 76.0, unit = "kg", source = "scales" }'
+
+
+def written(folder, text, name="mine.toml"):
+    path = folder / name
+    path.write_text(text, encoding="utf-8")
+    return path
+
+
+def test_a_robot_takes_from_another_what_it_does_not_say(tmp_path):
+    path = written(
+        tmp_path, 'extends = "fptlir"\ncontact.wheel_radius = { value = 8, unit = "cm", source = "measured" }'
+    )
+    mine, standard = load_robot(path), load_robot("fptlir")
+    assert mine.parameters == standard.parameters and mine.title == standard.title
+    assert mine.contact_parameters == standard.contact_parameters | {"wheel_radius": 0.08}
+
+
+def test_inertia_that_a_robot_gives_is_not_scaled(tmp_path):
+    """Twice the mass alone doubles it; an entry of its own says that the others hold as they are."""
+    doubled = load_robot(written(tmp_path, f'extends = "fptlir"\n{MASS}')).body.inertia.tensor
+    assert (doubled == 2.0 * load_robot("fptlir").body.inertia.tensor).all()
+    own = 'body.inertia.zz = { value = 9.0, unit = "kg.m2", source = "measured" }'
+    tensor = load_robot(written(tmp_path, f'extends = "fptlir"\n{MASS}\n{own}')).body.inertia.tensor
+    assert tensor[0, 0] == 5.8 and tensor[2, 2] == 9.0
+
+
+def test_inertia_is_scaled_once_through_two_files(tmp_path):
+    """From 10 kg, which is scaled from 38 kg itself, to 76 kg: twice that of 38 kg."""
+    tensor = load_robot(written(tmp_path, f'extends = "fptlir_10kg"\n{MASS}')).body.inertia.tensor
+    assert tensor == pytest.approx(2.0 * load_robot("fptlir").body.inertia.tensor, rel=1e-14)
+
+
+def test_the_file_with_the_mistake_is_named(tmp_path):
+    base = written(
+        tmp_path, (FOLDER / "fptlir.toml").read_text(encoding="utf-8").replace("5.8,", "-5.8,", 1), "base.toml"
+    )
+    path = written(tmp_path, 'extends = "base.toml"\nlayuot = "top"')
+    with pytest.raises(InputError) as caught:
+        load_robot(path)
+    first, second = sorted(caught.value.problems)
+    assert first.startswith(f"{base}: body.inertia.xx: -5.8 kg.m2 must be greater than 0")
+    assert second.startswith(f"{path}: layuot: unknown key; did you mean layout?")
+
+
+@pytest.mark.parametrize(("unit", "value"), [("g", 38000.0), ("t", 0.038), ("kg", 38.0)])
+def test_units_are_those_of_scenarios(tmp_path, unit, value):
+    text = (FOLDER / "fptlir.toml").read_text(encoding="utf-8")
+    path = written(tmp_path, text.replace('value = 38.0, unit = "kg"', f'value = {value}, unit = "{unit}"'))
+    assert load_robot(path).parameters == load_robot("fptlir").parameters
+
+
+@pytest.mark.parametrize(
+    ("name", "fmu"), [("mine", "mine"), ("my robot-2", "my_robot_2"), ("4 wheels", "robot_4_wheels")]
+)
+def test_an_fmu_has_a_name_whatever_the_file_is_called(tmp_path, name, fmu):
+    spec = load_robot(written(tmp_path, 'extends = "fptlir"', f"{name}.toml"))
+    assert spec.name == name and robot_recipe(spec).name == fmu
+
+
+def test_two_robots_of_one_name_have_an_fmu_each(tmp_path, monkeypatch):
+    monkeypatch.setenv("LINE_LANDING_FMUS", str(tmp_path / "fmus"))
+    (tmp_path / "other").mkdir()
+    one = load_robot(written(tmp_path, 'extends = "fptlir"'))
+    other = load_robot(written(tmp_path / "other", f'extends = "fptlir"\n{MASS}'))
+    first, second = robot_fmu(one), robot_fmu(other)
+    masses = [of_fmu(path)["mass"].start for path in (first, second, robot_fmu(one))]
+    assert first != second and masses == [38.0, 76.0, 38.0]
+
+
+# -- a faulty file in the catalogue ------------------------------------------------------------------------------
+
+
+@pytest.fixture
+def faulty(tmp_path, monkeypatch):
+    """A catalogue of two, one of which is faulty."""
+    for name in ("fptlir", "linedrone"):
+        written(tmp_path, (FOLDER / f"{name}.toml").read_text(encoding="utf-8"), f"{name}.toml")
+    path = written(tmp_path, "title = ", "broken.toml")
+    monkeypatch.setattr(robot_spec, "FOLDER", tmp_path)
+    return path
+
+
+def test_a_faulty_file_is_listed_with_its_fault(faulty):
+    robots = listing.robots()
+    assert list(robots) == ["broken", "fptlir", "linedrone"] and robots["linedrone"] == load_robot("linedrone").title
+    assert robots["broken"].startswith(f"faulty: {faulty}: not a TOML file: ") and "mend that line" in robots["broken"]
+
+
+@pytest.mark.parametrize("arguments", [["build"], ["validate", "landing_200m_point9", "--robot", "broken"]])
+def test_a_faulty_file_ends_in_a_message(faulty, arguments, capsys):
+    with pytest.raises(SystemExit) as end:
+        main(arguments)
+    assert end.value.code == 2 and f"{faulty}: not a TOML file" in capsys.readouterr().err
+
+
+def test_the_rest_of_a_catalogue_with_a_faulty_file_is_of_use(faulty, capsys):
+    with pytest.raises(SystemExit) as end:
+        main(["list"])
+    shown = capsys.readouterr().out
+    assert end.value.code == 0 and "faulty: " in shown and load_robot("linedrone").title in shown

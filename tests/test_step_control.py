@@ -73,19 +73,26 @@ def drop(macro_step: float, *settings: str):
     return load(DROP, [*times, *hard, *settings])
 
 
+HEIGHTS = [0.05 * (1.0 + 1e-12 * k) for k in range(5)]
+"""m: starts that are the same but for round-off."""
+
+
 def test_hard_impact_takes_fewer_solves_than_fixed_steps():
     """Macro steps of 20 ms, k = 1e10: fixed steps of 1.25 ms take more solves and are further from the monolithic height.
 
-    The roll of both is what the impact leaves in the first tenth of a second.
+    The roll of both is what the impact leaves in the first tenth of a second. How many solves an impact takes is chaotic:
+    a difference of 1e-12 in the height costs another rejected pair, a tenth of all solves, in one run of eight. The median
+    of five is a tenth below the fixed steps; errors are smooth.
     """
     reference = solve_reference(drop(0.02), [0.00125])
     fixed = held_against(result(run_coupled(drop(0.00125))), reference)
-    adaptive = held_against(result(run_coupled(drop(0.02, "master.local_tolerance=1e-6"))), reference)
+    starts = [("master.local_tolerance=2e-6", f"landing.height={height}") for height in HEIGHTS]
+    adaptive = [held_against(result(run_coupled(drop(0.02, *settings))), reference) for settings in starts]
     z, roll = "robot.body.position.z", "robot.roll"
-    assert adaptive.unconverged_steps == 0
-    assert adaptive.cable_steps < fixed.cable_steps
-    assert adaptive.signals[z].max_error < 0.5 * fixed.signals[z].max_error
-    assert adaptive.signals[roll].max_error < 1.1 * fixed.signals[roll].max_error
+    assert all(one.unconverged_steps == 0 for one in adaptive)
+    assert np.median([one.cable_steps for one in adaptive]) < fixed.cable_steps
+    assert max(one.signals[z].max_error for one in adaptive) < 0.5 * fixed.signals[z].max_error
+    assert max(one.signals[roll].max_error for one in adaptive) < 1.1 * fixed.signals[roll].max_error
 
 
 def test_steps_of_a_run_say_what_was_rejected():

@@ -5,6 +5,7 @@ import pytest
 from scipy.integrate import solve_ivp
 
 from fmus.cable.assembly import add_inertia, add_load, constrain_vector, element_work, internal_force, interpolate
+from fmus.contact import places as at
 from fmus.contact.law import contact_wrench, law_parameters
 from fmus.kernels.rotations import normalize, quaternion_rate
 from fmus.robot import rigid_body as rb
@@ -62,26 +63,29 @@ class Independent:
         q, v, body, z = y[:n], y[n : 2 * n], np.zeros(rb.RIGID), y[2 * n + 13 :]
         body[:13] = y[2 * n : 2 * n + 13]
         normalize(body[3:7])
-        motion, out, external = np.zeros(24), np.zeros(32), np.zeros(n)
-        rb.wheel_motion(self.robot, body, 0, motion[12:24])
-        s = self._foot(q, motion[12:24])
-        interpolate(self.model, q, s, np.zeros(8), motion[0:6])
-        interpolate(self.model, v, s, np.zeros(8), motion[6:12])
+        motion, out, external = np.zeros(at.MOTION_SIZE), np.zeros(at.OUT_SIZE), np.zeros(n)
+        rb.wheel_motion(self.robot, body, 0, motion[at.CENTRE : at.MOTION_SIZE])
+        s = self._foot(q, motion[at.CENTRE : at.MOTION_SIZE])
+        interpolate(self.model, q, s, np.zeros(8), motion[at.POINT : at.POINT_RATE])
+        interpolate(self.model, v, s, np.zeros(8), motion[at.POINT_RATE : at.CENTRE])
         contact_wrench(self.contact, motion, z.copy(), out)
-        add_load(self.model, q, s, out[0:3], out[3:6], np.zeros(8), external)
+        force, moment = out[at.CABLE_FORCE : at.CABLE_MOMENT], out[at.CABLE_MOMENT : at.WHEEL_FORCE]
+        add_load(self.model, q, s, force, moment, np.zeros(8), external)
         force = np.zeros(n)
         internal_force(self.model, q, v, force, self.axial, self.work)
         load = self.model.weight + external - force
         constrain_vector(self.model, load)
         loads = np.zeros(rb.BODY_LOADS + rb.WHEEL_LOADS)
-        loads[rb.BODY_LOADS : rb.BODY_LOADS + 6] = out[6:12]
+        loads[rb.BODY_LOADS : rb.BODY_LOADS + 6] = out[at.WHEEL_FORCE : at.NORMAL]
         resultant, moment, torque, acceleration = np.zeros(3), np.zeros(3), np.zeros(4), np.zeros(10)
         rb.resultants(self.robot, body, loads, resultant, moment, torque)
         rb.accelerations(self.robot, body, resultant, moment, torque, acceleration)
         turn = np.zeros(4)
         quaternion_rate(body[3:7], *body[10:13], turn)
         accelerations = np.linalg.solve(self.mass, load)
-        slip = out[16:18] if out[12] > 0.0 else -1e3 * z  # in the air the bristle relaxes
+        slip = out[at.SLIP_VELOCITY : at.CONTACT_LENGTH]
+        if out[at.NORMAL] <= 0.0:
+            slip = -1e3 * z  # in the air the bristle relaxes
         return np.concatenate([v, accelerations, body[7:10], turn, acceleration[:6], slip])
 
 

@@ -14,6 +14,8 @@ from tests.scenarios import scenario
 STOP, STEP = 0.1, 0.005
 Z, FORCE = "robot.body.position.z", "contact1.normal_force"
 WEIGHT = 38.0 * 9.8
+REST = 1e-13 * 200.0
+"""m: the line at rest is found to 1e-13 of its length, and so is whether the robot touches it."""
 HEIGHT = "initial.position.z"
 
 
@@ -54,7 +56,10 @@ def test_start(start, stiffness, master):
     log = coupled(one, shift, master)
     assert log.error is None and log.unconverged == 0
     assert log.signal(FORCE)[0] == pytest.approx(reference.signals[FORCE][0], rel=1e-9, abs=1e-9)
-    assert (log.signal(FORCE)[0] > 0.0) == (start == "in contact")
+    if start == "in contact":  # `resting` finds the height to 2e-12 m, 1e-8 of the depth at k = 1e10
+        assert log.signal(FORCE)[0] * np.sin(np.radians(50.0)) == pytest.approx(WEIGHT, rel=1e-6)
+    else:
+        assert log.signal(FORCE)[0] <= (stiffness * REST**2.5 if start == "touching" else 0.0)
     assert np.max(log.signal(FORCE)) > 100.0
     z = reference.signals[Z]
     assert reference.estimated_error[Z] < 1e-5 * np.ptp(z)

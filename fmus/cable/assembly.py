@@ -78,6 +78,16 @@ def add_inertia(model, a, force, work):
 
 
 @kernel
+def residual(model, q, v, a, external, force, axial, work):
+    """Write M a + Q(q, v) - weight - external to `force` (n,), supports not applied; return dissipated power."""
+    power = internal_force(model, q, v, force, axial, work)[1]
+    add_inertia(model, a, force, work)
+    for i in range(force.size):
+        force[i] -= model.weight[i] + external[i]
+    return power
+
+
+@kernel
 def constrain_vector(model, x):
     """Take from `x` (n,) what the supports hold: the positions of the ends, and their slopes where clamped."""
     n = x.size

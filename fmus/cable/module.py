@@ -5,9 +5,10 @@ from __future__ import annotations
 import numpy as np
 from scipy.optimize import root_scalar
 
-from fmus.cable import dynamics
+from fmus.cable import dynamics, ports
 from fmus.cable.assembly import Model, interpolate
-from fmus.cable.dynamics import N_PORTS
+from fmus.cable.diagnosis import diagnose
+from fmus.cable.state import N_PORTS, NOT_FINITE, OFF_CABLE, OK, factorise_mass, make_work, state_size
 from fmus.cable.statics import equilibrium, mesh_model
 from fmus.kernels.time_integration import collocation, generalized_alpha
 from fmus.module.variables import (
@@ -106,11 +107,11 @@ def _port(k: int) -> tuple[list[Variable], list[Variable]]:
 
 
 def _table() -> VariableTable:
-    ports = [_port(k + 1) for k in range(N_PORTS)]
+    rows_of = [_port(k + 1) for k in range(N_PORTS)]
     rows = _parameters()
-    for inputs, _ in ports:
+    for inputs, _ in rows_of:
         rows += inputs
-    for _, outputs in ports:
+    for _, outputs in rows_of:
         rows += outputs
     for name, unit, description in (
         ("tension_left", "N", "tension at the left support"),
@@ -144,8 +145,8 @@ class Cable:
     def __init__(self) -> None:
         self.values = self.table.defaults()
         self.state = np.zeros(0)
-        self._ports = self._rows("port[1].s", N_PORTS, 13)
-        self._shown_ports = self._rows("port[1].position.x", N_PORTS, 22)
+        self._ports = self._rows("port[1].s", N_PORTS, ports.N_INPUTS)
+        self._shown_ports = self._rows("port[1].position.x", N_PORTS, ports.N_SHOWN)
         self._shape = self._rows("shape[1].position.x", N_SHAPE, 4)
         self._shown = self._rows("tension_left", 1, 13)[0]
 
@@ -164,17 +165,17 @@ class Cable:
             self.values[self.table.index["unstretched_length"]] = self._length_for_sag()
         self.model, q = self._rest(self["unstretched_length"])
         n = q.size
-        self.state = np.zeros(dynamics.state_size(n))
+        self.state = np.zeros(state_size(n))
         self.state[:n] = q
         self._collocation = collocation(self["spectral_radius"])
         self._alpha = generalized_alpha(self["spectral_radius"])
         self._use_alpha = self["integrator"] == 1.0
-        self._work = dynamics.make_work(n, self.state.size)
-        dynamics.factorise_mass(self.model, q, self._work)
+        self._work = make_work(n, self.state.size)
+        factorise_mass(self.model, q, self._work)
         self.refresh()
         self._diagnose(np.zeros_like(self._ports))  # at rest, before any load
-        self._shown_ports[:, 12:18] = self._shown_ports[:, :6]
-        self._shown_ports[:, 18] = 0.0
+        self._shown_ports[:, ports.MEANS : ports.PORT_WORK] = self._shown_ports[:, :6]
+        self._shown_ports[:, ports.PORT_WORK] = 0.0
 
     def _rest(self, length: float) -> tuple[Model, np.ndarray]:
         """Return the cable of the given unstretched length and its equilibrium (n,)."""
@@ -230,17 +231,18 @@ class Cable:
             self._shape,
             self._work,
         )
-        if status != dynamics.OK:
+        if status != OK:
             raise ModuleError(self._failure(status, t, h))
 
     def _failure(self, status: int, t: float, h: float) -> str:
         """Return what to say of a step that was not made."""
-        if status == dynamics.NOT_FINITE:
+        if status == NOT_FINITE:
             return f"cable: an input at a port is not a finite number at t = {t:g} s"
-        if status == dynamics.OFF_CABLE:
-            k = int(np.argmax((self._ports[:, 0] < 0.0) | (self._ports[:, 0] > self.model.s[-1])))
+        if status == OFF_CABLE:
+            arcs, length = self._ports[:, ports.S], self.model.s[-1]
+            k = int(np.argmax((arcs < 0.0) | (arcs > length)))
             return (
-                f"cable: port[{k + 1}].s = {self._ports[k, 0]:g} m is off the cable (0 to {self.model.s[-1]:g} m) at "
+                f"cable: port[{k + 1}].s = {arcs[k]:g} m is off the cable (0 to {length:g} m) at "
                 f"t = {t:g} s: the wheel has run past a support; stop the run earlier, or brake the robot"
             )
         shortest = min(h, self["integration_step"]) / 2**dynamics.MAX_HALVINGS
@@ -251,21 +253,21 @@ class Cable:
 
     def refresh(self) -> None:
         """Write the motion of the ports at the present state and arc lengths; all else stays as it is."""
-        dynamics.show_ports(self.model, self.state, self._ports, self._shown_ports, self._work)
+        ports.show_ports(self.model, self.state, self._ports, self._shown_ports, self._work)
 
     def show(self) -> None:
         """Write all outputs but means and work at the present state, whoever has put it there."""
         self.refresh()
         self._diagnose(self._ports)
 
-    def _diagnose(self, ports: np.ndarray) -> None:
-        """Write tensions, energies, reactions and the shape; `ports` (N_PORTS, 13) are the loads that act."""
-        dynamics.diagnose(
+    def _diagnose(self, loads: np.ndarray) -> None:
+        """Write tensions, energies, reactions and the shape; `loads` (N_PORTS, 13) act at the ports."""
+        diagnose(
             self.model,
             self._collocation,
             self._use_alpha,
             self.state,
-            ports,
+            loads,
             self._shown,
             self._shape,
             self._work,

@@ -1,8 +1,7 @@
 """The contact law at one instant: a straight piece of cable in the V-groove of a wheel.
 
-Vectors are inertial. ``motion`` (24,) holds ``p`` 0:3 the cable point at the contact's arc length, ``t`` 3:6
-its tangent dr/ds, ``dp`` 6:9 and ``dt`` 9:12 their rates, ``w`` 12:15 the wheel centre, ``a`` 15:18 the axle,
-``dw`` 18:21 the wheel's velocity and ``om`` 21:24 its angular velocity. Equations: README.md of this folder.
+Vectors are inertial. Where things stand in ``prm``, ``motion`` and ``out``: places.py. Equations: README.md of this
+folder.
 """
 
 from __future__ import annotations
@@ -11,42 +10,26 @@ import math
 
 import numpy as np
 
+from fmus.contact import places as at
 from fmus.kernels.jit import kernel
 from fmus.module.variables import VariableTable
 
-PARAMETERS = (
-    "stiffness",
-    "exponent",
-    "damping",
-    "friction_coefficient",
-    "wheel_radius",
-    "groove_angle",
-    "groove_width",
-    "cable_diameter",
-    "max_contact_length",
-    "tangential_stiffness",
-    "tangential_damping",
-)
-"""Names of ``prm[0:11]``; behind them stand sine and cosine of half the groove angle and the apex radius."""
-
-OUT_SIZE = 32
 OPEN, STICK, SLIP, LEFT = 0, 1, 2, 3
+"""Status of a contact; `LEFT`: the cable has left the groove."""
 OK, NO_TANGENT, NO_AXLE, NOT_FINITE = 0, 1, 2, 3
-
-_K, _N, _D, _MU, _RADIUS, _ANGLE, _WIDTH, _DIAMETER, _LENGTH, _KT, _CT, _SIN, _COS, _APEX = range(14)
-
+"""What the kernels return: done, or why the law cannot be evaluated."""
 
 NODES, WEIGHTS = np.polynomial.legendre.leggauss(9)
 """Gauss-Legendre rule on the piece of cable that a wall touches (relative error 4e-6 at n = 2.5)."""
 
 
 def law_parameters(values: np.ndarray, table: VariableTable) -> np.ndarray:
-    """Return the law's parameters from a module's flat array of values: (14,) float64."""
-    prm = np.zeros(len(PARAMETERS) + 3)
-    prm[: len(PARAMETERS)] = values[table.indices(PARAMETERS)]
-    half = 0.5 * prm[_ANGLE]
-    prm[_SIN], prm[_COS] = math.sin(half), math.cos(half)
-    prm[_APEX] = prm[_RADIUS] - 0.5 * prm[_WIDTH] / math.tan(half)
+    """Return the law's parameters ``prm`` from a module's flat array of values: (14,) float64."""
+    prm = np.zeros(at.PRM_SIZE)
+    prm[: len(at.PARAMETERS)] = values[table.indices(at.PARAMETERS)]
+    half = 0.5 * prm[at.GROOVE_ANGLE]
+    prm[at.SINE], prm[at.COSINE] = math.sin(half), math.cos(half)
+    prm[at.APEX] = prm[at.WHEEL_RADIUS] - 0.5 * prm[at.GROOVE_WIDTH] / math.tan(half)
     return prm
 
 
@@ -81,12 +64,24 @@ def _combine(a, x, b):
 
 
 @kernel
+def _triple(x, first):
+    """Return three entries of an array from `first` on."""
+    return (x[first], x[first + 1], x[first + 2])
+
+
+@kernel
+def _square(x, first):
+    """Return the sum of the squares of three entries of an array from `first` on."""
+    return x[first] ** 2 + x[first + 1] ** 2 + x[first + 2] ** 2
+
+
+@kernel
 def foot(motion):
     """Return |t|, the unit tangent u, the offset (m) of the wheel centre's foot from p, and foot - w."""
-    t = (motion[3], motion[4], motion[5])
+    t = _triple(motion, at.TANGENT)
     length = math.sqrt(_dot(t, t))
     u = (t[0] / length, t[1] / length, t[2] / length)
-    d = (motion[0] - motion[12], motion[1] - motion[13], motion[2] - motion[14])
+    d = _combine(_triple(motion, at.POINT), -1.0, _triple(motion, at.CENTRE))
     offset = -_dot(d, u)
     return length, u, offset, _combine(d, offset, u)
 
@@ -94,7 +89,7 @@ def foot(motion):
 @kernel
 def axle(motion):
     """Return the axle, normalised: along an interpolated path it is a unit vector to second order only."""
-    a = (motion[15], motion[16], motion[17])
+    a = _triple(motion, at.AXLE)
     norm = math.sqrt(_dot(a, a))
     return (a[0] / norm, a[1] / norm, a[2] / norm)
 
@@ -116,9 +111,9 @@ def _deepest(side, u_a, apart, prm):
     The penetration is concave along the line while the angle between cable and wheel plane is below half the
     groove angle; beyond, its end is deepest.
     """
-    half = 0.5 * prm[_LENGTH]
-    slope = side * prm[_COS] * u_a
-    room = prm[_SIN] ** 2 - u_a * u_a
+    half = 0.5 * prm[at.MAX_LENGTH]
+    slope = side * prm[at.COSINE] * u_a
+    room = prm[at.SINE] ** 2 - u_a * u_a
     if room <= 0.0:
         return half if slope > 0.0 else -half
     radial = 1.0 - u_a * u_a
@@ -134,9 +129,9 @@ def _touched(side, u_a, y, distance_squared, prm):
     delta > 0 means rho(x) < A + B x, a quadratic inequality. Where the cable is steeper than the wall (more
     than half the groove angle off the wheel plane) the whole longest contact length is returned.
     """
-    half = 0.5 * prm[_LENGTH]
-    c = prm[_COS] / prm[_SIN]
-    A = prm[_APEX] + 0.5 * prm[_DIAMETER] / prm[_SIN] + side * c * y
+    half = 0.5 * prm[at.MAX_LENGTH]
+    c = prm[at.COSINE] / prm[at.SINE]
+    A = prm[at.APEX] + 0.5 * prm[at.CABLE_DIAMETER] / prm[at.SINE] + side * c * y
     B = side * c * u_a
     q2 = 1.0 - u_a * u_a - B * B
     q1 = y * u_a + A * B
@@ -154,34 +149,34 @@ def walls(prm, motion, out):
     Parameters
     ----------
     prm : (14,) of `law_parameters`
-    motion : (24,) see the module's head
+    motion : (24,) of cable point and wheel: places.py
     out : (32,) as `contact_wrench`; friction's places are zero
 
     Returns
     -------
     int, 0 or the cause of failure: 1 tangent without length, 2 axle without length, 3 motion not finite
     """
-    for i in range(OUT_SIZE):
+    for i in range(at.OUT_SIZE):
         out[i] = 0.0
-    if not motion[3] ** 2 + motion[4] ** 2 + motion[5] ** 2 > 0.0:
+    if not _square(motion, at.TANGENT) > 0.0:
         return NO_TANGENT
-    if not motion[15] ** 2 + motion[16] ** 2 + motion[17] ** 2 > 0.0:
+    if not _square(motion, at.AXLE) > 0.0:
         return NO_AXLE
     length, u, offset, d = foot(motion)
     a = axle(motion)
     b = lateral(u, a)
-    om = (motion[21], motion[22], motion[23])
+    om = _triple(motion, at.TURN_RATE)
 
     # relative velocity cable - wheel at distance x from the foot: v + x dv
-    dt = (motion[9], motion[10], motion[11])
+    dt = _triple(motion, at.TANGENT_RATE)
     du = _combine(dt, -_dot(dt, u), u)
     du = (du[0] / length, du[1] / length, du[2] / length)
-    v = (motion[6] - motion[18], motion[7] - motion[19], motion[8] - motion[20])
+    v = _combine(_triple(motion, at.POINT_RATE), -1.0, _triple(motion, at.CENTRE_RATE))
     v = _combine(_combine(v, offset, du), -1.0, _cross(om, d))
     dv = _combine(du, -1.0, _cross(om, u))
-    out[16] = _dot(v, u)
-    out[17] = _dot(v, b)
-    out[20] = offset / length
+    out[at.SLIP_VELOCITY] = _dot(v, u)
+    out[at.SLIP_VELOCITY + 1] = _dot(v, b)
+    out[at.OFFSET] = offset / length
 
     # axial and radial parts: y + x u_a, r + x ur, rho^2 = rr0 + 2 rr1 x + rr2 x^2
     y = _dot(d, a)
@@ -192,16 +187,17 @@ def walls(prm, motion, out):
     va0, va1 = _dot(v, a), _dot(dv, a)
     vr0, vr1, vr2 = _dot(v, r), _dot(v, ur) + _dot(dv, r), _dot(dv, ur)
     distance_squared = _dot(d, d)
-    if not math.isfinite(distance_squared + va0 + va1 + vr0 + vr1 + vr2 + out[16] + out[17]):
+    slip = out[at.SLIP_VELOCITY], out[at.SLIP_VELOCITY + 1]
+    if not math.isfinite(distance_squared + va0 + va1 + vr0 + vr1 + vr2 + slip[0] + slip[1]):
         return NOT_FINITE
     centre = -rr1 / rr2 if rr2 > 1e-18 else 0.0
     closest = math.sqrt(max(rr0 + rr1 * centre, 0.0))
 
-    k, n, damping = prm[_K], prm[_N], prm[_D]
-    s, c, radius = prm[_SIN], prm[_COS], 0.5 * prm[_DIAMETER]
-    rim = 0.5 * prm[_WIDTH]
+    k, n, damping = prm[at.STIFFNESS], prm[at.EXPONENT], prm[at.DAMPING]
+    s, c, radius = prm[at.SINE], prm[at.COSINE], 0.5 * prm[at.CABLE_DIAMETER]
+    rim = 0.5 * prm[at.GROOVE_WIDTH]
     outside = abs(y) > rim
-    left = outside and math.sqrt(rr0) < prm[_RADIUS] + radius
+    left = outside and math.sqrt(rr0) < prm[at.WHEEL_RADIUS] + radius
 
     normal = power = energy = 0.0
     sum_a = sum_ax = sum_r = sum_rx = sum_rxx = 0.0
@@ -211,7 +207,7 @@ def walls(prm, motion, out):
         side = 1.0 - 2.0 * wall
         x = _deepest(side, u_a, (centre, closest), prm)
         rho = math.sqrt(max(rr0 + x * (2.0 * rr1 + x * rr2), 0.0))
-        delta = radius - s * (rho - prm[_APEX]) + side * c * (y + x * u_a)
+        delta = radius - s * (rho - prm[at.APEX]) + side * c * (y + x * u_a)
         deepest = max(deepest, delta)
         if delta <= 0.0 or outside:
             continue
@@ -221,11 +217,11 @@ def walls(prm, motion, out):
         for i in range(len(NODES)):
             x = middle + half * NODES[i]
             rho = math.sqrt(max(rr0 + x * (2.0 * rr1 + x * rr2), 1e-24))
-            delta = radius - s * (rho - prm[_APEX]) + side * c * (y + x * u_a)
+            delta = radius - s * (rho - prm[at.APEX]) + side * c * (y + x * u_a)
             if delta <= 0.0:
                 continue
             rate = side * c * (va0 + x * va1) - s * (vr0 + x * (vr1 + x * vr2)) / rho
-            elastic = WEIGHTS[i] * half / prm[_LENGTH] * k * _power(delta, n)
+            elastic = WEIGHTS[i] * half / prm[at.MAX_LENGTH] * k * _power(delta, n)
             f = elastic * max(1.0 + damping * rate, 0.0)
             normal += f
             power += (f - elastic) * rate
@@ -237,8 +233,8 @@ def walls(prm, motion, out):
             sum_rx += radial * x
             sum_rxx += radial * x * x
 
-    out[15] = deepest
-    out[19] = LEFT if left else OPEN
+    out[at.DEEPEST] = deepest
+    out[at.STATUS] = LEFT if left else OPEN
     if normal == 0.0 and energy == 0.0:
         return OK
     # resultant and first moment of the distributed force along the line
@@ -256,15 +252,15 @@ def walls(prm, motion, out):
     about_foot = _cross(u, spread)
     lever = _cross(d, force)
     for i in range(3):
-        out[i] = force[i]
-        out[3 + i] = on_cable[i]
-        out[6 + i] = -force[i]
-        out[9 + i] = -(lever[i] + about_foot[i])
-    out[12] = normal
-    out[18] = last - first
-    out[19] = STICK if normal > 0.0 else OPEN
-    out[23] = power
-    out[25] = energy
+        out[at.CABLE_FORCE + i] = force[i]
+        out[at.CABLE_MOMENT + i] = on_cable[i]
+        out[at.WHEEL_FORCE + i] = -force[i]
+        out[at.WHEEL_MOMENT + i] = -(lever[i] + about_foot[i])
+    out[at.NORMAL] = normal
+    out[at.CONTACT_LENGTH] = last - first
+    out[at.STATUS] = STICK if normal > 0.0 else OPEN
+    out[at.WALL_POWER] = power
+    out[at.WALL_ENERGY] = energy
     return OK
 
 
@@ -275,28 +271,29 @@ def friction(prm, motion, slip, out):
     The elongation is projected on the disc |k_t z| <= mu N, then the force k_t z + c_t v on the disc mu N.
     Both are projections on a convex set, so that neither can give back more energy than was put in.
     """
-    kt, ct = prm[_KT], prm[_CT]
-    limit = prm[_MU] * out[12]
+    kt, ct = prm[at.TANGENTIAL_STIFFNESS], prm[at.TANGENTIAL_DAMPING]
+    limit = prm[at.FRICTION_COEFFICIENT] * out[at.NORMAL]
     if limit <= 0.0:
         return
     z0, z1 = slip[0], slip[1]
+    v0, v1 = out[at.SLIP_VELOCITY], out[at.SLIP_VELOCITY + 1]
     elongation = kt * math.sqrt(z0 * z0 + z1 * z1)
     if elongation > limit:
         z0 *= limit / elongation
         z1 *= limit / elongation
-        out[19] = SLIP
-    f0 = kt * z0 + ct * out[16]
-    f1 = kt * z1 + ct * out[17]
+        out[at.STATUS] = SLIP
+    f0 = kt * z0 + ct * v0
+    f1 = kt * z1 + ct * v1
     size = math.sqrt(f0 * f0 + f1 * f1)
     if size > limit:
         f0 *= limit / size
         f1 *= limit / size
-    out[13], out[14] = -f0, -f1
-    out[21], out[22] = z0, z1
-    out[24] = (f0 - kt * z0) * out[16] + (f1 - kt * z1) * out[17]
-    if out[19] == SLIP:
-        out[24] += max(kt * (z0 * out[16] + z1 * out[17]), 0.0)
-    out[26] = 0.5 * kt * (z0 * z0 + z1 * z1)
+    out[at.FRICTION], out[at.FRICTION + 1] = -f0, -f1
+    out[at.ELONGATION], out[at.ELONGATION + 1] = z0, z1
+    out[at.FRICTION_POWER] = (f0 - kt * z0) * v0 + (f1 - kt * z1) * v1
+    if out[at.STATUS] == SLIP:
+        out[at.FRICTION_POWER] += max(kt * (z0 * v0 + z1 * v1), 0.0)
+    out[at.BRISTLE_ENERGY] = 0.5 * kt * (z0 * z0 + z1 * z1)
 
     _length, u, offset, d = foot(motion)
     b = lateral(u, axle(motion))
@@ -304,10 +301,10 @@ def friction(prm, motion, slip, out):
     on_cable = _cross(u, force)
     on_wheel = _cross(d, force)
     for i in range(3):
-        out[i] += force[i]
-        out[3 + i] += offset * on_cable[i]
-        out[6 + i] -= force[i]
-        out[9 + i] -= on_wheel[i]
+        out[at.CABLE_FORCE + i] += force[i]
+        out[at.CABLE_MOMENT + i] += offset * on_cable[i]
+        out[at.WHEEL_FORCE + i] -= force[i]
+        out[at.WHEEL_MOMENT + i] -= on_wheel[i]
 
 
 @kernel
@@ -317,14 +314,9 @@ def contact_wrench(prm, motion, slip, out):
     Parameters
     ----------
     prm : (14,) of `law_parameters`
-    motion : (24,) see the module's head
+    motion : (24,) of cable point and wheel: places.py
     slip : (2,) m, trial elongation of the friction bristle along the cable and along the axle
-    out : (32,) 0:3 force (N) and 3:6 moment about p (N.m) on the cable, 6:9 force and 9:12 moment about w on
-        the wheel, 12 normal force of both walls, 13:15 friction on the cable along cable and axle, 15 deepest
-        penetration (m; negative: the gap), 16:18 slip velocity of the cable relative to the wheel, 18 contact
-        length, 19 status, 20 offset of the contact from p (m of arc length), 21:23 elongation after the
-        Coulomb limit, 23 and 24 power (W) dissipated by the walls and by friction, 25 and 26 elastic energy
-        (J) of walls and bristle
+    out : (32,) wrenches on cable and wheel, kinematics, powers and energies: places.py
 
     Returns
     -------

@@ -7,7 +7,10 @@ import math
 import numpy as np
 
 from fmus.contact import exchange
-from fmus.contact.law import NO_AXLE, NO_TANGENT, NOT_FINITE, OPEN, OUT_SIZE, law_parameters
+from fmus.contact import places as at
+from fmus.contact.law import NO_AXLE, NO_TANGENT, NOT_FINITE, OPEN, law_parameters
+from fmus.contact.path import PATH_SHAPE
+from fmus.contact.sampling import gauss_rule
 from fmus.module.variables import (
     NON_NEGATIVE,
     POSITIVE,
@@ -148,7 +151,9 @@ def _outputs(motion: tuple[str, ...]) -> list[Variable]:
 def _table() -> VariableTable:
     inputs = _inputs()
     names = tuple(v.name for v in inputs)
-    motion = names[:24] + names[36:39] + names[42:45]
+    motion = names[: at.MOTION_SIZE]
+    for first in (at.ROTATION, at.CURVATURE):
+        motion += names[first : first + 3]
     return VariableTable([*_parameters(), *inputs, *_outputs(motion)])
 
 
@@ -163,24 +168,25 @@ class Contact:
 
     def __init__(self) -> None:
         self.values = self.table.defaults()
-        self.state = np.zeros(exchange.STATE_SIZE)
+        self.state = np.zeros(at.STATE_SIZE)
 
     def initialize(self, t: float) -> None:
         """Take over parameters and inputs; the bristle is relaxed, the outputs are the law's now."""
         self.check_parameters()
         self._prm = law_parameters(self.values, self.table)
         self._method = int(self._value("exchange"))
-        self._nodes, self._weights, self._increments = exchange.gauss_rule(SAMPLES)
-        self._path = np.zeros((4, 15))
-        self._motions = np.zeros((SAMPLES + 2, 24))
-        self._samples = np.zeros((SAMPLES + 1, OUT_SIZE))
-        self.state = np.zeros(exchange.STATE_SIZE)
-        self.state[exchange.LAST : exchange.LAST + 24] = self.values[self._INPUTS][:24]
-        self.state[exchange.CURVATURE : exchange.CURVATURE + 3] = self.values[self._INPUTS][42:45]
-        self.state[exchange.ARC] = self._value("initial.s")
+        self._nodes, self._weights, self._increments = gauss_rule(SAMPLES)
+        self._path = np.zeros(PATH_SHAPE)
+        self._motions = np.zeros((SAMPLES + 2, at.MOTION_SIZE))
+        self._samples = np.zeros((SAMPLES + 1, at.OUT_SIZE))
+        self.state = np.zeros(at.STATE_SIZE)
+        inputs = self.values[self._INPUTS]
+        self.state[at.LAST : at.LAST + at.MOTION_SIZE] = inputs[: at.MOTION_SIZE]
+        self.state[at.LAST_CURVATURE : at.LAST_CURVATURE + 3] = inputs[at.CURVATURE : at.CURVATURE + 3]
+        self.state[at.ARC] = self._value("initial.s")
         self.refresh()
         outputs = self.values[self._OUTPUTS]
-        self.state[exchange.STORED] = outputs[exchange.O_STRAIN]
+        self.state[at.STORED] = outputs[at.O_STRAIN]
 
     def refresh(self) -> None:
         """Write the outputs at the instant of the inputs, with the state as it is."""

@@ -129,3 +129,26 @@ def follow_euler(q, angles):
     angles[0] = roll + turn * math.floor((angles[0] - roll) / turn + 0.5)
     angles[1] = pitch
     angles[2] = yaw + turn * math.floor((angles[2] - yaw) / turn + 0.5)
+
+
+@kernel
+def turn(q, theta, scratch, out):
+    """Write the quaternion exp(theta) q to `out`, which may not be q."""
+    from_rotation_vector(theta, scratch)
+    multiply(scratch, q, out)
+    normalize(out)
+
+
+@kernel
+def rotation_vector_rate(theta, w, out):
+    """Write T(theta)⁻¹ w, the rate of the rotation vector at the inertial angular velocity w."""
+    t0, t1, t2 = theta[0], theta[1], theta[2]
+    square = t0 * t0 + t1 * t1 + t2 * t2
+    factor = 1.0 / 12.0 + square / 720.0
+    if square > 1e-4:
+        half = 0.5 * math.sqrt(square)
+        factor = (1.0 - half / math.tan(half)) / square
+    c0, c1, c2 = t1 * w[2] - t2 * w[1], t2 * w[0] - t0 * w[2], t0 * w[1] - t1 * w[0]
+    out[0] = w[0] - 0.5 * c0 + factor * (t1 * c2 - t2 * c1)
+    out[1] = w[1] - 0.5 * c1 + factor * (t2 * c0 - t0 * c2)
+    out[2] = w[2] - 0.5 * c2 + factor * (t0 * c1 - t1 * c0)

@@ -130,7 +130,7 @@ def convert(value: float, given: str, wanted: str) -> float:
     A number is taken by its shortest decimal text, as it stands in a file; equal units leave it as it is. `UnitError`
     says what is possible where `given` is no measure of `wanted`.
     """
-    given, wanted = given.strip(), wanted or "1"
+    given, wanted = given.strip() or "1", wanted or "1"
     if given == wanted:
         return value
     one, other = unit(given), unit(wanted)

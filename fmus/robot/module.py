@@ -18,7 +18,7 @@ from fmus.module.variables import (
     parameter,
     vector,
 )
-from fmus.robot import rigid_body
+from fmus.robot import dynamics, rigid_body
 
 ROUND_OFF = 1e-9
 """Relative; a macro step longer than a whole number of inner steps by less than this needs no further one."""
@@ -210,14 +210,16 @@ def body_parameters(values: np.ndarray, table: VariableTable) -> np.ndarray:
 
 def initial_state(values: np.ndarray, table: VariableTable) -> np.ndarray:
     """Return the rigid-body state (21,) that the parameters `initial.*` describe, wheels at rest."""
-    state = np.zeros(rigid_body.RIGID)
+    rb = rigid_body
+    state = np.zeros(rb.RIGID)
     roll, pitch, yaw = (float(values[table.index[f"initial.{a}"]]) for a in ("roll", "pitch", "yaw"))
-    from_euler(roll, pitch, yaw, state[3:7])
-    arm = np.array(rotate(state[3:7], *_vector(values, table, "center_of_mass")))
+    attitude = state[rb.ATTITUDE : rb.VELOCITY]
+    from_euler(roll, pitch, yaw, attitude)
+    arm = np.array(rotate(attitude, *_vector(values, table, "center_of_mass")))
     w_IB = _vector(values, table, "initial.angular_velocity")
-    state[0:3] = _vector(values, table, "initial.position") + arm
-    state[7:10] = _vector(values, table, "initial.velocity") + np.cross(w_IB, arm)
-    state[10:13] = w_IB
+    state[rb.POSITION : rb.POSITION + 3] = _vector(values, table, "initial.position") + arm
+    state[rb.VELOCITY : rb.VELOCITY + 3] = _vector(values, table, "initial.velocity") + np.cross(w_IB, arm)
+    state[rb.TURN_RATE : rb.TURN_RATE + 3] = w_IB
     return state
 
 
@@ -236,9 +238,9 @@ class Robot:
         self.n_wheels = n_wheels
         self.table = robot_table(n_wheels)
         self.values = self.table.defaults()
-        self.state = np.zeros(rigid_body.MEMORY + rigid_body.WHEEL_MEMORY * n_wheels)
+        self.state = np.zeros(dynamics.MEMORY + dynamics.WHEEL_MEMORY * n_wheels)
         self._prm = np.zeros(rigid_body.N_PARAMETERS)
-        self._work = np.zeros(rigid_body.WORKSPACE)
+        self._work = np.zeros(dynamics.WORKSPACE)
         self._inner_step = 0.0
         first_input = len(self.table.names("parameter"))
         first_output = first_input + len(self.table.names("input"))
@@ -252,19 +254,19 @@ class Robot:
         self._inner_step = float(self.values[self.table.index["integration_step"]])
         self.state[:] = 0.0
         self.state[: rb.RIGID] = initial_state(self.values, self.table)
-        angles = self.state[rb.ANGLES : rb.ANGLES + 3]
+        angles = self.state[dynamics.ANGLES : dynamics.ANGLES + 3]
         angles[:] = self.values[self.table.indices(f"initial.{a}" for a in ("roll", "pitch", "yaw"))]
-        follow_euler(self.state[3:7], angles)
+        follow_euler(self.state[rb.ATTITUDE : rb.VELOCITY], angles)
         motion = np.zeros(12)
         for k in range(self.n_wheels):
             rb.wheel_motion(self._prm, self.state, k, motion)
-            means = rb.MEMORY + rb.WHEEL_MEMORY * k
+            means = dynamics.MEMORY + dynamics.WHEEL_MEMORY * k
             self.state[means : means + 6] = motion[:6]
         self.refresh()
 
     def refresh(self) -> None:
         """Write the outputs from the state; no output depends on an input without a step."""
-        rigid_body.outputs(self._prm, self.state, self.values[self._outputs])
+        dynamics.outputs(self._prm, self.state, self.values[self._outputs])
 
     def step(self, t: float, h: float) -> None:
         """Advance from `t` to `t + h` with the inputs' means and slopes; a `ModuleError` changes nothing."""
@@ -272,8 +274,8 @@ class Robot:
             raise ModuleError(f"step at {t:g} s: macro step {h:g} s is not positive; choose one above 0")
         n_inner = max(1, math.ceil(h / self._inner_step * (1.0 - ROUND_OFF)))
         inputs = self.values[self._inputs]
-        status = rigid_body.step(self._prm, inputs, self.state, float(h), n_inner, self._work)
-        if status != rigid_body.DONE:
+        status = dynamics.step(self._prm, inputs, self.state, float(h), n_inner, self._work)
+        if status != dynamics.DONE:
             raise ModuleError(self._failure(t, h, n_inner, status))
         self.refresh()
 
@@ -282,7 +284,7 @@ class Robot:
         for name in self.table.names("input"):
             if not math.isfinite(self.values[self.table.index[name]]):
                 return f"{where}: input {name} is not a finite number; look at what is connected to it"
-        if status == rigid_body.TURNS_TOO_FAST:
+        if status == dynamics.TURNS_TOO_FAST:
             return (
                 f"{where}: the body turns by more than 1 rad in an inner step of {h / n_inner:g} s; "
                 "lower integration_step, or look for loads that are too large"

@@ -4,6 +4,8 @@ from __future__ import annotations
 
 import tomllib
 from collections.abc import Callable, Iterable, Iterator
+from contextlib import contextmanager
+from contextvars import ContextVar
 from dataclasses import dataclass, field
 from pathlib import Path
 from typing import Any
@@ -72,10 +74,36 @@ def leaves(document: Document, prefix: str = "") -> Iterator[str]:
             yield prefix + key
 
 
+_texts: ContextVar[dict[Path, str] | None] = ContextVar("texts", default=None)
+
+
+@contextmanager
+def read_once() -> Iterator[None]:
+    """Within it each file is read once, so that a command sees one state of it, however many ask."""
+    if _texts.get() is not None:
+        yield
+        return
+    token = _texts.set({})
+    try:
+        yield
+    finally:
+        _texts.reset(token)
+
+
+def _text(path: Path) -> str:
+    known = _texts.get()
+    if known is None:
+        return path.read_text(encoding="utf-8")
+    place = path.resolve()
+    if place not in known:
+        known[place] = path.read_text(encoding="utf-8")
+    return known[place]
+
+
 def read(path: Path) -> Document:
     """Return the content of a TOML file; `InputError` names file, cause and cure."""
     try:
-        return tomllib.loads(path.read_text(encoding="utf-8"))
+        return tomllib.loads(_text(path))
     except OSError as error:
         raise InputError(f"{path}: cannot be read ({error.strerror}); check the path") from None
     except UnicodeDecodeError as error:

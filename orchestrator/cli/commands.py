@@ -121,6 +121,8 @@ def validate(scenario: ScenarioFile, robot: Robot = None, set_: Set = None) -> N
     from orchestrator.runs.components import master_of, opened
 
     loaded = load_scenario(scenario, set=set_, robot=robot)
+    for note in loaded.notes:
+        complain(note)
     with opened(loaded) as graph:
         master_of(loaded, graph)
         print(f"{scenario}: valid; {len(graph.components)} FMUs, {len(list(graph.connections))} connections")

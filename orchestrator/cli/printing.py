@@ -3,7 +3,7 @@
 from __future__ import annotations
 
 import sys
-from collections.abc import Callable, Iterable, Iterator
+from collections.abc import Callable, Iterator, Sequence
 from contextlib import contextmanager
 from typing import TYPE_CHECKING
 
@@ -14,8 +14,10 @@ if TYPE_CHECKING:
     from orchestrator.runs.result import Run
 
 
-def complain_of(runs: Iterable[Run]) -> None:
-    """Say on stderr what went wrong in `runs`."""
+def complain_of(runs: Sequence[Run]) -> None:
+    """Say on stderr what is to be known of `runs`, and what went wrong in them."""
+    for note in dict.fromkeys(note for run in runs for note in run.notes):
+        complain(note)
     for run in runs:
         for line in run.warnings:
             complain(f"{run.label}: {line}")

@@ -1,28 +1,190 @@
-"""What crosses an interface within a macro step."""
+"""The exchange: what crosses an interface within a macro step.
+
+A table says what two components may assume of one another between two communication points (`EXCHANGES`), and names say
+which variable is what. A *load* X comes with its slope over the step, ``X_rate``; a *motion* X, given at the end of the step,
+with its time mean, ``X_mean``; both are *companions* of X, the suffix stands before the axis: ``force_rate.x``. A load does
+work on the motion of the same place (`LOADS`).
+"""
 
 from __future__ import annotations
 
 import re
+from collections.abc import Container, Sequence
+from dataclasses import dataclass
+from typing import Literal
 
 import numpy as np
+
+# -- what is assumed ----------------------------------------------------------------------------------------------
+
+
+@dataclass(frozen=True)
+class Exchange:
+    """What components assume of one another within a macro step.
+
+    Attributes
+    ----------
+    name : value of an FMU's parameter of the name `PARAMETER`
+    slopes, means : whether loads come with slopes, motions with time means
+    holds : whether an FMU that could take means takes its inputs as they are all the same
+    order : of the error where the motion is smooth and the master implicit
+    order_of_estimates : the order that is reckoned with, since touch, lift-off or slip may fall inside a step
+    inner_steps : steps that an expensive component makes in a macro step, so that their error shrinks with it as that of
+        the exchange does, and stays a tenth of it (docs/notebook/decisions.md)
+    instead : the exchange for components that have no slopes or no means, if this one needs them
+    """
+
+    name: str
+    slopes: bool
+    means: bool
+    order: int
+    order_of_estimates: int
+    inner_steps: int
+    instead: str = ""
+    holds: bool = False
+
+    def possible(self, *, slopes: bool, means: bool) -> Exchange:
+        """Return this one, or the best one for components that have `slopes`, that have `means`."""
+        if (self.slopes and not slopes) or (self.means and not means):
+            return EXCHANGES[self.instead].possible(slopes=slopes, means=means)
+        return self
+
+
+EXCHANGES = {
+    row.name: row
+    for row in (
+        Exchange("held", False, False, order=2, order_of_estimates=2, inner_steps=1, holds=True),
+        Exchange("point", False, False, order=2, order_of_estimates=2, inner_steps=1),
+        Exchange("hermite", True, False, order=4, order_of_estimates=2, inner_steps=4, instead="point"),
+        Exchange("waveform", True, True, order=4, order_of_estimates=3, inner_steps=4, instead="hermite"),
+    )
+}
+"""What there is, from the coarsest to the finest (docs/concepts/exchange.md)."""
+OTHER = Exchange("", True, True, order=2, order_of_estimates=2, inner_steps=1)
+"""Of an FMU that says nothing or has an exchange of its own: whatever it has variables for."""
+EXPLICIT_ORDER = 1
+"""Order of the error of an explicit master, at least, whatever the exchange."""
+PARAMETER = "exchange"
+"""The FMU's parameter that chooses."""
+Choice = Literal["point", "hermite", "waveform"]
+"""What can be asked for as a whole; `held` is left to FMUs whose own parameter has it."""
+
+
+def exchange_named(name: str) -> Exchange:
+    """Return the row of the table, `OTHER` if there is none of that name."""
+    return EXCHANGES.get(name, OTHER)
+
+
+def suited_to(*, implicit: bool) -> Choice:
+    """Return what suits a master best: one that goes back can make slopes and means consistent."""
+    return "waveform" if implicit else "point"
+
+
+# -- what is what, by name ----------------------------------------------------------------------------------------
+
+RATE, MEAN = "_rate", "_mean"
+"""Suffixes of companions."""
+
+
+@dataclass(frozen=True)
+class Load:
+    """A load, and the motion of the same place that it does work on.
+
+    Attributes
+    ----------
+    from_start : whether the motion is counted from the start of the macro step
+    """
+
+    motion: str
+    from_start: bool = False
+
+
+LOADS = {"force": Load("position"), "moment": Load("rotation", from_start=True)}
+"""By the last part of a variable's name."""
+FROM_START = tuple(load.motion for load in LOADS.values() if load.from_start)
+MOMENTS = ("moment", "torque")
+"""Loads that act through a force at the same place and its lever."""
+
+
+def split(name: str) -> tuple[str, str, str]:
+    """Return place, last part and axis of a name: ``port[1].``, ``force``, ``.x``; the first and the last may be empty."""
+    stem = re.sub(r"\.[xyz]$", "", name)
+    place, dot, last = stem.rpartition(".")
+    return place + dot, last, name[len(stem) :]
 
 
 def suffixed(name: str, suffix: str) -> str:
     """Return ``force_rate.x`` for ``force.x`` and ``_rate``: the suffix goes before the axis."""
-    stem, axis = re.fullmatch(r"(.*?)(\.[xyz])?", name).groups()  # type: ignore[union-attr]
-    return f"{stem}{suffix}{axis or ''}"
+    place, last, axis = split(name)
+    return f"{place}{last}{suffix}{axis}"
 
 
-def vectors(names: list[str]) -> np.ndarray:
+def is_companion(name: str) -> bool:
+    """Return whether `name` is that of a slope or of a mean."""
+    return split(name)[1].endswith((RATE, MEAN))
+
+
+def is_motion(name: str, names: Container[str]) -> bool:
+    """Return whether one of `names` is a motion: its time mean is among them."""
+    return suffixed(name, MEAN) in names
+
+
+def is_load(name: str, names: Container[str]) -> bool:
+    """Return whether one of `names` is a load: its slope is among them, and no mean. The rate of a motion is no slope."""
+    return suffixed(name, RATE) in names and not is_motion(name, names)
+
+
+def is_rate_of_motion(name: str, names: Container[str]) -> bool:
+    """Return whether one of `names` is the rate of a motion: a value at an instant, no slope over the step."""
+    place, last, axis = split(name)
+    return last.endswith(RATE) and is_motion(f"{place}{last.removesuffix(RATE)}{axis}", names)
+
+
+def is_from_start(name: str) -> bool:
+    """Return whether `name` is that of a motion counted from the start of the macro step."""
+    return split(name)[1] in FROM_START
+
+
+def is_slope_of_load(name: str) -> bool:
+    """Return whether `name` is that of the slope of one of the `LOADS`."""
+    return split(name)[1] in {load + RATE for load in LOADS}
+
+
+def is_of_step(name: str) -> bool:
+    """Return whether an output speaks of the whole step, not of its end: a mean, or a motion counted from the start."""
+    return split(name)[1].endswith(MEAN) or is_from_start(name)
+
+
+def only_couples(name: str) -> bool:
+    """Return whether a component of a vector is there for the coupling alone: a companion, or a motion counted from the
+    start of the step."""
+    return split(name)[2] != "" and (is_companion(name) or is_from_start(name))
+
+
+def motion_of(load: str) -> tuple[str, bool]:
+    """Return the motion that a load does work on, ``port[1].position.x`` for ``port[1].force.x``, and whether it is counted
+    from the start of the step."""
+    place, last, axis = split(load)
+    return f"{place}{LOADS[last].motion}{axis}", LOADS[last].from_start
+
+
+def force_beside(moment: str) -> str:
+    """Return the force at the place of a moment; any other name as it is."""
+    place, last, axis = split(moment)
+    return f"{place}force{axis}" if last in MOMENTS else moment
+
+
+def vectors(names: Sequence[str]) -> np.ndarray:
     """Return for each name the number of the vector it is a component of, (len(names),) int: x, y, z have one."""
     number = {stem: i for i, stem in enumerate(stems(names))}
     return np.array([number[_stem(name)] for name in names], dtype=np.intp)
 
 
-def stems(names: list[str]) -> list[str]:
+def stems(names: Sequence[str]) -> list[str]:
     """Return the names of those vectors, in the order of their numbers: without the axis."""
     return list(dict.fromkeys(map(_stem, names)))
 
 
 def _stem(name: str) -> str:
-    return re.sub(r"\.[xyz]$", "", name)
+    place, last, _ = split(name)
+    return place + last

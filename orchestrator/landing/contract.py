@@ -13,8 +13,9 @@ from typing import Any, Literal
 from fmus.module.variables import Causality, Variable
 from orchestrator.catalogue import modules as vocabulary
 from orchestrator.coupling.errors import InputError
+from orchestrator.coupling.exchange import PARAMETER, suited_to
 
-Verdict = Literal["ok", "missing", "wrong", "advice"]
+Standing = Literal["ok", "missing", "wrong", "advice"]
 
 
 @dataclass(frozen=True)
@@ -41,7 +42,7 @@ def _scalar(name: str, causality: Causality, unit: str, needed: bool = True, use
     return Point(name, causality, unit, needed, False, use)
 
 
-ENERGY_CONJUGATE = "for exchange = waveform"
+ENERGY_CONJUGATE = f"for {PARAMETER} = {suited_to(implicit=True)}"
 
 ROBOT = (
     Point("wheel[k].force", "input", "N"),
@@ -137,7 +138,7 @@ class Finding:
     """One line of the answer: what was looked at, how it stands, and why."""
 
     what: str
-    verdict: Verdict
+    verdict: Standing
     note: str = ""
 
 
@@ -221,5 +222,5 @@ def _capabilities(path: Path, description: Any) -> list[Finding]:
     ]
 
 
-def _advised(given: bool, why: str) -> tuple[Verdict, str]:
+def _advised(given: bool, why: str) -> tuple[Standing, str]:
     return ("ok", "") if given else ("advice", f"no: {why}")

@@ -12,7 +12,8 @@ from scipy.optimize import least_squares, root_scalar
 
 from fmus.cable.assembly import interpolate
 from fmus.cable.module import Cable
-from fmus.contact.law import PARAMETERS, law_parameters
+from fmus.contact import places as at
+from fmus.contact.law import law_parameters
 from fmus.contact.module import Contact
 from fmus.kernels.rotations import from_euler, rotate
 from fmus.module.variables import ModuleError
@@ -38,8 +39,7 @@ class Placement:
 def touching_distance(contact: Contact) -> float:
     """Return the distance (m) of wheel centre and centreline at which both walls touch: R_b + d_c / (2 sin(θ/2))."""
     prm = law_parameters(contact.values, contact.table)
-    sine, apex = prm[-3], prm[-1]
-    return float(apex + 0.5 * prm[PARAMETERS.index("cable_diameter")] / sine)
+    return float(prm[at.APEX] + 0.5 * prm[at.CABLE_DIAMETER] / prm[at.SINE])
 
 
 def place(

@@ -7,18 +7,25 @@ from pathlib import Path
 
 from fmus.module.variables import Value
 from orchestrator.catalogue import library
+from orchestrator.coupling.exchange import (
+    EXCHANGES,
+    MEAN,
+    PARAMETER,
+    RATE,
+    Exchange,
+    is_slope_of_load,
+    motion_of,
+    suffixed,
+)
 from orchestrator.coupling.fmu.instance import Fmu
 from orchestrator.coupling.fmu.sub_steps import instance
 from orchestrator.coupling.graph.graph import Graph
 from orchestrator.coupling.graph.links import Connection
 from orchestrator.landing.resolve import Landing
 
-INNER_STEPS = {"waveform": 4, "hermite": 4, "point": 1}
-"""Inner steps of our cable in a macro step, where the scenario gives no `integration_step`. The error that they leave
-shrinks with the macro step as that of the exchange does, and stays a tenth of it (docs/notebook/decisions.md)."""
 LONGEST_ADAPTIVE = 2.5e-3
-"""Longest such step, s, where the master's steps are adaptive: long macro steps are then wanted, and the local error does
-not tell that of the cable's inner steps (docs/notebook/adaptive.md)."""
+"""Longest inner step of our cable, s, where the master's steps are adaptive: long macro steps are then wanted, and the
+local error does not tell that of the cable's inner steps (docs/notebook/adaptive.md)."""
 
 
 def landing_graph(landing: Landing, exchange: str) -> Graph:
@@ -30,14 +37,15 @@ def landing_graph(landing: Landing, exchange: str) -> Graph:
     files = _files(landing)
     try:
         components["cable"] = instance(files["cable"], "cable", landing.cable.steps)
-        components["cable"].set_parameters(_inner_step(landing, exchange) | dict(landing.cable.settings))
+        components["cable"].set_parameters(_inner_step(landing, EXCHANGES[exchange]) | dict(landing.cable.settings))
         components["robot"] = instance(files["robot"], "robot", landing.robot.steps)
         components["robot"].set_parameters(landing.robot.settings)
-        exchange = _possible(exchange, components)
+        possible = _possible(EXCHANGES[exchange], components)
+        told = {**landing.contact.settings, PARAMETER: possible.name}
         for k, s in enumerate(landing.placement.arc_lengths, start=1):
             components[f"contact{k}"] = Fmu(files["contact"], f"contact{k}")
-            components[f"contact{k}"].set_parameters({**landing.contact.settings, "initial.s": s, "exchange": exchange})
-        return Graph(components, _connections(components, exchange), order=tuple(components))
+            components[f"contact{k}"].set_parameters({**told, "initial.s": s})
+        return Graph(components, _connections(components, possible), order=tuple(components))
     except BaseException:
         for fmu in components.values():
             fmu.close()
@@ -54,27 +62,27 @@ def _files(landing: Landing) -> dict[str, Path]:
     return foreign | dict(zip(ours, library.kept(ours.values()), strict=True))
 
 
-def _inner_step(landing: Landing, exchange: str) -> dict[str, Value]:
-    """Return the longest inner step of our own cable."""
-    step = landing.scenario.simulation.macro_step / INNER_STEPS[exchange]
+def _inner_step(landing: Landing, exchange: Exchange) -> dict[str, Value]:
+    """Return the longest inner step of our own cable, where the scenario gives none."""
+    step = landing.scenario.simulation.macro_step / exchange.inner_steps
     if landing.scenario.master.get("local_tolerance"):
         step = min(step, LONGEST_ADAPTIVE)
     return {"integration_step": step} if landing.cable.foreign is None else {}
 
 
-def _possible(exchange: str, components: Mapping[str, Fmu]) -> str:
+def _possible(exchange: Exchange, components: Mapping[str, Fmu]) -> Exchange:
     """Return `exchange`, or the best that cable and robot admit.
 
     Without inputs for slopes only `point` is left: a mean force that is held feeds the contact's vibration.
     """
     cable, robot = components["cable"].ports, components["robot"].ports
-    if not ("port[1].force_rate.x" in cable and "wheel[1].force_rate.x" in robot):
-        return "point"
-    means = "port[1].position_mean.x" in cable and "wheel[1].rotation_mean.x" in robot
-    return "hermite" if exchange == "waveform" and not means else exchange
+    push, turn = "port[1].force.x", "wheel[1].moment.x"
+    slopes = suffixed(push, RATE) in cable and suffixed("wheel[1].force.x", RATE) in robot
+    means = suffixed(motion_of(push)[0], MEAN) in cable and suffixed(motion_of(turn)[0], MEAN) in robot
+    return exchange.possible(slopes=slopes, means=means)
 
 
-def _connections(components: Mapping[str, Fmu], exchange: str) -> list[Connection]:
+def _connections(components: Mapping[str, Fmu], exchange: Exchange) -> list[Connection]:
     """Return all connections of the contract for which both sides have the variable.
 
     `point` gives no slopes: left open, the masters set them by joining or extrapolating the forces of the ends.
@@ -86,8 +94,7 @@ def _connections(components: Mapping[str, Fmu], exchange: str) -> list[Connectio
         k = name.removeprefix("contact")
         for side, partner in (("cable", f"cable.port[{k}]"), ("wheel", f"robot.wheel[{k}]")):
             found += _links(components, f"{name}.{side}", partner)
-    slopes = ("force_rate.", "moment_rate.")
-    return [c for c in found if exchange != "point" or not any(slope in c.source for slope in slopes)]
+    return [c for c in found if exchange.slopes or not is_slope_of_load(c.source)]
 
 
 def _links(components: Mapping[str, Fmu], contact: str, partner: str) -> Iterator[Connection]:

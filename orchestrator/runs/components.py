@@ -8,6 +8,7 @@ from contextlib import contextmanager
 
 from fmus.module.variables import ModuleError
 from orchestrator.coupling.errors import InputError, RunError, nearest
+from orchestrator.coupling.exchange import only_couples
 from orchestrator.coupling.fmu.failure import FmuError
 from orchestrator.coupling.fmu.sub_steps import check_steps
 from orchestrator.coupling.graph.graph import Graph
@@ -56,14 +57,11 @@ def recorded(graph: Graph) -> list[str]:
         f"{component}.{name}"
         for component, fmu in graph.components.items()
         for name, port in fmu.ports.items()
-        if port.causality == "output" and port.is_number and not only_couples(name, contacts)
+        if port.causality == "output" and port.is_number and not is_idle(name, contacts)
     ]
 
 
-def only_couples(name: str, contacts: int) -> bool:
+def is_idle(name: str, contacts: int) -> bool:
     """Whether an output is that of an unused port, or a mean or rate that only serves the coupling."""
     unused = re.match(r"(?:port|wheel)\[(\d+)\]", name)
-    return bool(
-        re.search(r"_(mean|rate)\.[xyz]$|\.rotation(_mean)?\.[xyz]$", name)
-        or (unused and 0 < contacts < int(unused[1]))
-    )
+    return only_couples(name) or bool(unused and 0 < contacts < int(unused[1]))

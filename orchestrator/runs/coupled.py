@@ -27,7 +27,7 @@ OF_A_STEP = (
     "time", "iterations", "residual", "subdivisions", "rejected", "columns", "converged", "estimate", "power_residual",
 )  # fmt: skip
 """What is kept of the report of a macro step."""
-Progress = Callable[[float], None]
+Reached = Callable[[float], None]
 """Told the time (s) that a run has come to."""
 
 
@@ -86,7 +86,7 @@ class Coupled:
         ]
 
 
-def run_coupled(system: System | Scenario, progress: Progress = lambda _: None) -> Coupled:
+def run_coupled(system: System | Scenario, progress: Reached = lambda _: None) -> Coupled:
     """Run a system coupled; a scenario is resolved first. A failure in mid-run does not raise: `log.error` says it."""
     if isinstance(system, Scenario):
         system = resolve(system)
@@ -106,7 +106,7 @@ def _unit(graph: Graph, signal: str) -> str:
     return graph.components[component].ports[name].unit
 
 
-def _simulated(scenario: Scenario, graph: Graph, progress: Progress) -> Log:
+def _simulated(scenario: Scenario, graph: Graph, progress: Reached) -> Log:
     simulation = scenario.simulation
     with interruptible() as check:
 
@@ -124,7 +124,7 @@ def _simulated(scenario: Scenario, graph: Graph, progress: Progress) -> Log:
             raise RunError(str(error), error.time) from None
 
 
-def completed(system: System, progress: Progress) -> Coupled:
+def completed(system: System, progress: Reached) -> Coupled:
     """Run a system coupled to its end; `RunError` if it does not come there."""
     try:
         coupled = run_coupled(system, progress)

@@ -15,10 +15,11 @@ from __future__ import annotations
 from typing import Any
 
 from orchestrator.coupling.errors import OrchestratorError
+from orchestrator.coupling.exchange import EXPLICIT_ORDER, exchange_named
 from orchestrator.coupling.masters import MASTERS
 from orchestrator.coupling.masters.options import master_options
 from orchestrator.coupling.run.compare import largest_difference
-from orchestrator.runs.coupled import Coupled, Progress, completed
+from orchestrator.runs.coupled import Coupled, Reached, completed
 from orchestrator.runs.systems import System
 from orchestrator.scenario.types import Scenario
 
@@ -35,7 +36,8 @@ def factor(scenario: Scenario, exchange: str) -> float:
     The order p of the error: 3 for `waveform`, which has 4 where the motion is smooth and about 2 where touch, lift-off
     or slip falls inside a step; 2 for other implicit coupling, of values at an instant; 1 at least for explicit coupling.
     """
-    order = (3 if exchange == "waveform" else 2) if MASTERS[scenario.simulation.master].IMPLICIT else 1
+    implicit = MASTERS[scenario.simulation.master].IMPLICIT
+    order = exchange_named(exchange).order_of_estimates if implicit else EXPLICIT_ORDER
     finer = scenario.simulation.estimate == "finer"
     return (2**order if finer else 1) / (2**order - 1)
 
@@ -61,7 +63,7 @@ def _options(scenario: Scenario, ratio: float) -> dict[str, Any]:
     return dict(scenario.master) | {n: all_options[n] * change for n, change in by.items() if all_options.get(n)}
 
 
-def estimate_error(coupled: Coupled, progress: Progress = lambda _: None) -> Coupled | None:
+def estimate_error(coupled: Coupled, progress: Reached = lambda _: None) -> Coupled | None:
     """Estimate the error of a finished run by a second one, and note it in `coupled`; a failure is noted, not raised.
 
     Returns

@@ -17,8 +17,8 @@ from orchestrator.coupling.run.compare import communication_times, largest_diffe
 from orchestrator.landing import monolithic
 from orchestrator.landing.monolithic import Problem
 from orchestrator.runs.compare import Reference
-from orchestrator.runs.components import only_couples
-from orchestrator.runs.coupled import Progress, completed
+from orchestrator.runs.components import is_idle
+from orchestrator.runs.coupled import Reached, completed
 from orchestrator.runs.systems import System, resolve
 from orchestrator.scenario.types import DEFAULT_MASTER, Scenario
 
@@ -27,7 +27,7 @@ TIGHTER = 1e-2
 
 
 def solve_reference(
-    system: System | Scenario, macro_steps: Iterable[float], progress: Progress = lambda _: None
+    system: System | Scenario, macro_steps: Iterable[float], progress: Reached = lambda _: None
 ) -> Reference:
     """Return the reference at the communication points of all `macro_steps`; a scenario is resolved first."""
     if isinstance(system, Scenario):
@@ -41,7 +41,7 @@ def solve_reference(
 
 
 def _monolithic_reference(
-    system: System, problem: Callable[[], Problem], times: np.ndarray, progress: Progress
+    system: System, problem: Callable[[], Problem], times: np.ndarray, progress: Reached
 ) -> Reference:
     try:
         solution = monolithic.solve(problem, times, progress=progress)
@@ -49,12 +49,12 @@ def _monolithic_reference(
         raise RunError(str(error)) from None
     fields, table = system.split({"time": times, **solution.signals})
     contacts = sum(name.endswith(".normal_force") for name in table)
-    table = {name: values for name, values in table.items() if not only_couples(name.partition(".")[2], contacts)}
+    table = {name: values for name, values in table.items() if not is_idle(name.partition(".")[2], contacts)}
     estimates = {name: solution.estimated_error[name] for name in table if name != "time"}
     return Reference("monolithic", table, solution.wall_s, estimates, fields)
 
 
-def _fine_reference(system: System, macro_steps: list[float], progress: Progress) -> Reference:
+def _fine_reference(system: System, macro_steps: list[float], progress: Reached) -> Reference:
     """Return the same graph at a much smaller macro step; its error is taken from one twice as large."""
     common, own = common_divisor(macro_steps), system.scenario.master
     try:

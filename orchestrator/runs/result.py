@@ -147,6 +147,11 @@ class Run:
         return EXIT_STATUS[self.verdict]
 
     @property
+    def notes(self) -> list[str]:
+        """What was decided in reading the scenario that its author may not expect, a line each."""
+        return self.summary["notes"]
+
+    @property
     def energy(self) -> audit.Audit | None:
         """The energy audit; None where a component does not show its energy."""
         return audit.of_coupled(self.table, self.tolerances.values())

@@ -40,6 +40,7 @@ def summary(coupled: Coupled) -> dict[str, Any]:
         "scenario": scenario.name,
         "title": scenario.title,
         "verdict": verdict(coupled),
+        "notes": scenario.notes,
         **about,
         "master": coupled.master,
         "exchange": coupled.exchange or None,

@@ -2,16 +2,16 @@
 
 from __future__ import annotations
 
-import re
-from collections.abc import Callable, Container, Iterable, Mapping
+from collections.abc import Callable, Iterable, Mapping
 from dataclasses import dataclass, replace
 from pathlib import Path
-from typing import Any, Literal, Protocol, TypeVar
+from typing import Any, Protocol, TypeVar
 
 import numpy as np
 
 from orchestrator.catalogue import library
 from orchestrator.catalogue import modules as vocabulary
+from orchestrator.coupling.exchange import PARAMETER, Choice, exchange_named, is_companion, is_rate_of_motion, suited_to
 from orchestrator.coupling.fmu.instance import Fmu
 from orchestrator.coupling.fmu.sub_steps import instance
 from orchestrator.coupling.graph.graph import Graph
@@ -19,7 +19,7 @@ from orchestrator.coupling.graph.links import Connection
 from orchestrator.coupling.masters import MASTERS
 from orchestrator.coupling.run.results import Table
 from orchestrator.landing import audit
-from orchestrator.landing import build as modules
+from orchestrator.landing.build import has_monolithic, problem
 from orchestrator.landing.fields import cable_fields
 from orchestrator.landing.monolithic import Problem
 from orchestrator.landing.resolve import Landing, Variables
@@ -27,8 +27,6 @@ from orchestrator.landing.resolve import resolve as resolve_landing
 from orchestrator.landing.wiring import landing_graph
 from orchestrator.scenario.types import CableSection, Component, GraphScenario, LandingScenario, RobotSection, Scenario
 
-HOLDING = ("held", "point")
-"""Exchanges in which our modules neither give nor take slopes and means."""
 INNER_STEP = "integration_step"
 Fields = dict[str, np.ndarray]
 Stepped = TypeVar("Stepped", CableSection, RobotSection, Component)
@@ -94,7 +92,7 @@ class LandingSystem:
 
     def problem(self) -> Callable[[], Problem] | None:
         """Return what makes the monolithic problem; None where our modules cannot stand for a foreign FMU."""
-        return (lambda: modules.problem(self.landing)) if modules.has_monolithic(self.landing) else None
+        return (lambda: problem(self.landing)) if has_monolithic(self.landing) else None
 
     def split(self, table: Table) -> tuple[Fields, Table]:
         """Return the cable's shape and tension over time as arrays, and the table without them."""
@@ -134,7 +132,7 @@ class GraphSystem:
         try:
             for name, section in self.scenario.components.items():
                 components[name] = self._loaded(name, section)
-            return Graph(components, _kept(map(_connection, self.scenario.connections), components))
+            return Graph(components, _kept(map(Connection.parse, self.scenario.connections), components))
         except BaseException:
             for fmu in components.values():
                 fmu.close()
@@ -147,9 +145,9 @@ class GraphSystem:
 
     def _own_exchange(self, name: str) -> dict[str, str]:
         """Return the exchange as a parameter of one of our modules, where it has this one."""
-        known, exchange = self.variables[name].get("exchange"), exchange_of(self.scenario)
+        known, exchange = self.variables[name].get(PARAMETER), exchange_of(self.scenario)
         ours = self.scenario.components[name].model is not None
-        return {"exchange": exchange} if ours and known is not None and exchange in known.choices else {}
+        return {PARAMETER: exchange} if ours and known is not None and exchange in known.choices else {}
 
     def problem(self) -> None:
         """Return None: a general graph has no monolithic solver."""
@@ -188,10 +186,9 @@ def _variables(section: Component) -> Variables:
     return vocabulary.of_fmu(Path(section.fmu)) if section.fmu else vocabulary.of_module(str(section.model))
 
 
-def exchange_of(scenario: Scenario) -> Literal["point", "hermite", "waveform"]:
+def exchange_of(scenario: Scenario) -> Choice:
     """Return the exchange within a macro step: the scenario's, else what suits the master."""
-    implicit = MASTERS[scenario.simulation.master].IMPLICIT
-    return scenario.simulation.exchange or ("waveform" if implicit else "point")
+    return scenario.simulation.exchange or suited_to(implicit=MASTERS[scenario.simulation.master].IMPLICIT)
 
 
 def _scaled(section: Stepped, known: Variables, ratio: float) -> Stepped:
@@ -204,19 +201,12 @@ def _scaled(section: Stepped, known: Variables, ratio: float) -> Stepped:
 
 def _kept(connections: Iterable[Connection], components: Mapping[str, Fmu]) -> list[Connection]:
     """Return `connections` without those of slopes and means where one end holds values at an instant."""
-    holding = {name for name, fmu in components.items() if fmu.exchange in HOLDING}
-    return [c for c in connections if not _serves_an_interval(c, holding)]
+    return [c for c in connections if not (is_companion(c.source) and _is_held(c, components))]
 
 
-def _serves_an_interval(connection: Connection, holding: Container[str]) -> bool:
-    """Return whether slopes or means go to or from one of the components that are `holding` values at an instant."""
-    ends = {signal.partition(".")[0] for signal in (connection.source, connection.target)}
-    between = re.search(r"_(rate|mean)(\.[xyz])?$", connection.source)
-    return between is not None and any(name in holding for name in ends)
-
-
-def _connection(text: str) -> Connection:
-    source, arrow, target = (part.strip() for part in text.partition("->"))
-    if not (source and arrow and target):
-        raise ValueError(f'connections: {text!r} is not of the form "a.x -> b.u"')
-    return Connection(source, target)
+def _is_held(connection: Connection, components: Mapping[str, Fmu]) -> bool:
+    """Return whether one end of a slope's or mean's connection holds values at an instant; the rate of a motion is one."""
+    split = [signal.partition(".") for signal in (connection.source, connection.target)]
+    ends = [(components[name], variable) for name, _, variable in split if name in components]
+    holding = any(not exchange_named(fmu.exchange).slopes for fmu, _ in ends)
+    return holding and not any(is_rate_of_motion(variable, fmu.ports) for fmu, variable in ends)

@@ -94,9 +94,14 @@ def _drop(document: Document, place: tuple[str, ...]) -> None:
 def _make_room_for_master(document: Document, master: Any) -> None:
     simulation, options = (_table(document, (key,)) or {} for key in ("simulation", "master"))
     if bare(simulation.get("master", DEFAULT_MASTER)) != master:
-        known = master_options().get(master, {})
-        document["master"] = {key: value for key, value in options.items() if key == "tolerance" and key in known}
+        document["master"] = shared_options(options, master)
         simulation.pop("exchange", None)
+
+
+def shared_options(options: Document, master: str) -> Document:
+    """Return those `options` of one master that are also for another: the tolerance."""
+    known = master_options().get(master, {})
+    return {key: value for key, value in options.items() if key == "tolerance" and key in known}
 
 
 # -- files -------------------------------------------------------------------------------------------------------

@@ -23,6 +23,7 @@ from pydantic import (
 
 from orchestrator.catalogue import modules as vocabulary
 from orchestrator.catalogue.quantities import Scalar
+from orchestrator.coupling.exchange import Choice
 
 DEFAULT_MASTER = "iqn_ils"
 
@@ -66,7 +67,7 @@ class Simulation(Section):
     stop_time: Annotated[Positive, In("s")]
     macro_step: Annotated[Positive, In("s")]
     master: str = DEFAULT_MASTER
-    exchange: Literal["point", "hermite", "waveform"] | None = None
+    exchange: Choice | None = None
     tolerances: dict[str, Positive] = {}
     estimate: Literal["finer", "coarser", "none"] = "finer"
     timeout: Annotated[Positive | None, In("s")] = None
@@ -110,7 +111,7 @@ class ContactSection(Section):
     parameters: Settings = {}
 
 
-class Landing(Section):
+class LandingSection(Section):
     """Where and how the robot comes down.
 
     Attributes
@@ -211,7 +212,7 @@ class LandingScenario(_Common):
     cable: CableSection
     robot: RobotSection
     contact: ContactSection = ContactSection()
-    landing: Landing
+    landing: LandingSection
 
 
 class GraphScenario(_Common):
@@ -227,7 +228,7 @@ Scenario = LandingScenario | GraphScenario
 
 UNITS = {
     f"{section}.{name}": marker.unit
-    for section, model in (("simulation", Simulation), ("landing", Landing))
+    for section, model in (("simulation", Simulation), ("landing", LandingSection))
     for name, field in model.model_fields.items()
     for marker in field.metadata
     if isinstance(marker, In)

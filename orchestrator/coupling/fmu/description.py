@@ -89,6 +89,11 @@ def ports_of(variable: ModelVariable) -> list[Port]:
     return [Port(name, variable.valueReference, *fixed, i) for i, name in enumerate(names)]
 
 
+def sha256_of(path: Path) -> str:
+    """Return the SHA-256 of a file as hexadecimal digits; each state of a file is read once."""
+    return _sha256(path, *_state(path))
+
+
 def parsed(path: Path) -> ModelDescription:
     """Return FMPy's model description of the file as it now is; each state of a file is read once."""
     return _parsed(path, *_state(path))
@@ -114,7 +119,7 @@ def read_description(path: Path) -> tuple[ModelDescription, str]:
     """Return model description and SHA-256 of an FMU; `ValueError` says what is wrong with it."""
     if not path.is_file():
         raise ValueError(f"{path}: no such file; build the FMUs, or correct the path")
-    sha256 = _sha256(path, *_state(path))
+    sha256 = sha256_of(path)
     try:
         description = parsed(path)
     except Exception as error:

@@ -18,6 +18,7 @@ import fmpy
 import numpy as np
 
 from orchestrator.coupling.errors import nearest
+from orchestrator.coupling.exchange import PARAMETER
 from orchestrator.coupling.fmu.binding import (
     DISCARD,
     ERROR,
@@ -136,8 +137,8 @@ class Fmu:
     @property
     def exchange(self) -> str:
         """What the FMU assumes of the motion inside a step (`held`, `point`, …), empty if it has no such parameter."""
-        port = self.ports.get("exchange")
-        return "" if port is None else str(self.parameters.get("exchange", port.start or ""))
+        port = self.ports.get(PARAMETER)
+        return "" if port is None else str(self.parameters.get(PARAMETER, port.start or ""))
 
     def twin(self) -> Fmu:
         """Return a second instance with the same parameters, not initialised."""

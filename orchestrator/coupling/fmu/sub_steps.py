@@ -2,7 +2,6 @@
 
 from __future__ import annotations
 
-import re
 from collections.abc import Mapping, Sequence
 from dataclasses import replace
 from itertools import pairwise
@@ -10,7 +9,7 @@ from pathlib import Path
 
 import numpy as np
 
-from orchestrator.coupling.exchange import suffixed
+from orchestrator.coupling.exchange import MEAN, RATE, is_from_start, is_load, is_motion, suffixed
 from orchestrator.coupling.fmu.binding import ERROR, SavedState
 from orchestrator.coupling.fmu.description import Port
 from orchestrator.coupling.fmu.failure import FmuError
@@ -18,7 +17,6 @@ from orchestrator.coupling.fmu.group import Group
 from orchestrator.coupling.fmu.instance import Fmu
 
 WHOLE = 1e-6  # how far a number of steps may be from a whole one
-RELATIVE = re.compile(r"(^|\.)rotation(\.[xyz])?$")  # counted from the start of the step
 
 
 def instance(path: str | Path, name: str, steps: int = 1) -> Fmu:
@@ -64,18 +62,19 @@ class SubStepped(Fmu):
     def _name_inputs(self) -> None:
         ports = self.ports
         names = [n for n, p in ports.items() if _is_continuous(p, "input")]
-        means = {suffixed(n, "_mean") for n in names} & set(names)
-        motions = [n for n in names if suffixed(n, "_mean") in means]
-        rates = {suffixed(n, "_rate") for n in names if n not in motions} & set(names)
-        alone = [n for n in names if n not in means | rates | set(motions)]
-        wanted = [suffixed(n, "_rate") for n in alone]
+        known = set(names)
+        motions = [n for n in names if is_motion(n, known)]
+        means = [suffixed(n, MEAN) for n in motions]
+        rates = [suffixed(n, RATE) for n in names if is_load(n, known)]
+        alone = [n for n in names if n not in {*motions, *means, *rates}]
+        wanted = [suffixed(n, RATE) for n in alone]
         self.made_up = [] if means else [rate for rate in wanted if rate not in ports]
         ports.update({rate: _rate_port(rate) for rate in self.made_up})
         self.place = {n: i for i, n in enumerate([*names, *self.made_up])}
         loads = [n for n, rate in zip(alone, wanted, strict=True) if rate in self.place]
-        self.load, self.slope = self._places(loads), self._places([suffixed(n, "_rate") for n in loads])
-        self.motion, self.mean = self._places(motions), self._places([suffixed(n, "_mean") for n in motions])
-        self.relative = np.array([bool(RELATIVE.search(n)) for n in motions], dtype=bool)
+        self.load, self.slope = self._places(loads), self._places([suffixed(n, RATE) for n in loads])
+        self.motion, self.mean = self._places(motions), self._places(means)
+        self.from_start = np.array([is_from_start(n) for n in motions], dtype=bool)
         self.end = self._places([n for n in alone if means and n not in loads])
         self.inputs = Group(self, names)
         self.held = np.zeros(len(self.place))
@@ -86,11 +85,12 @@ class SubStepped(Fmu):
 
     def _name_outputs(self) -> None:
         names = [n for n, p in self.ports.items() if _is_continuous(p, "output")]
-        motions = [n for n in names if suffixed(n, "_mean") in names]
-        turned = [n for n in motions if RELATIVE.search(n)]
-        plain = [suffixed(n, "_mean") for n in motions if n not in turned]
-        loads = [n for n in names if suffixed(n, "_rate") in names and n not in motions]
-        parts = [plain, turned, [suffixed(n, "_mean") for n in turned], loads, [suffixed(n, "_rate") for n in loads]]
+        known = set(names)
+        motions = [n for n in names if is_motion(n, known)]
+        turned = [n for n in motions if is_from_start(n)]
+        plain = [suffixed(n, MEAN) for n in motions if n not in turned]
+        loads = [n for n in names if is_load(n, known)]
+        parts = [plain, turned, [suffixed(n, MEAN) for n in turned], loads, [suffixed(n, RATE) for n in loads]]
         stops = np.cumsum([0, *(len(part) for part in parts)])
         self.parts = [slice(a, b) for a, b in pairwise(stops.tolist())]
         self.outputs = Group(self, [n for part in parts for n in part])
@@ -176,10 +176,10 @@ class SubStepped(Fmu):
         now[self.end] = self.ended[self.end] + (held[self.end] - self.ended[self.end]) * b
         if self.motion.size:
             x1, mean = held[self.motion], held[self.mean]
-            x0 = np.where(self.relative, 0.0, self.ended[self.motion])
+            x0 = np.where(self.from_start, 0.0, self.ended[self.motion])
             curve = 6.0 * ((x0 + x1) / 2 - mean)
             rise = x1 - x0 - curve
-            past = np.where(self.relative, x0 + rise * a + curve * a**2, 0.0)
+            past = np.where(self.from_start, x0 + rise * a + curve * a**2, 0.0)
             now[self.motion] = x0 + rise * b + curve * b**2 - past
             now[self.mean] = x0 + rise * (a + b) / 2 + curve * (a**2 + a * b + b**2) / 3 - past
         if n:

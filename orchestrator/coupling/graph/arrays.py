@@ -7,7 +7,7 @@ from dataclasses import dataclass
 
 import numpy as np
 
-from orchestrator.coupling.exchange import suffixed
+from orchestrator.coupling.exchange import RATE, is_load, suffixed
 from orchestrator.coupling.fmu.group import Group
 from orchestrator.coupling.fmu.instance import Fmu
 from orchestrator.coupling.graph.links import Link, Signal
@@ -159,9 +159,8 @@ class Arrays:
         fed = set(self._inputs)
         rates, places = [], []
         for i, (component, name) in enumerate(self._inputs):
-            ports, rate = self.components[component].ports, (component, suffixed(name, "_rate"))
-            known = rate[1] in ports and ports[rate[1]].causality == "input" and suffixed(name, "_mean") not in ports
-            if known and rate not in fed:
+            ports, rate = self.components[component].ports, (component, suffixed(name, RATE))
+            if is_load(name, ports) and ports[rate[1]].causality == "input" and rate not in fed:
                 rates.append(rate)
                 places.append(i)
         return rates, np.array(places, dtype=np.intp)
@@ -207,8 +206,7 @@ class Arrays:
             node.discrete_inputs.set()
 
     def companion(self, suffix: str) -> np.ndarray:
-        """Return for each place in u the place of its ``_rate`` or ``_mean`` companion of the same
-        component, or -1."""
+        """Return for each place in u the place of its companion (`RATE` or `MEAN`) of the same component, or -1."""
         place = {name: i for i, name in enumerate(self.input_names)}
         return np.array([place.get(suffixed(name, suffix), -1) for name in self.input_names], dtype=np.intp)
 

@@ -1,9 +1,8 @@
 """Work done through the interfaces, booked from what is exchanged.
 
-Where a component has an input ``X.force`` and an output ``X.position``, the force that acts in a step is
-F + Ḟ (tau - t - H/2), so that its work is F·Δx + Ḟ·(H/2 (x0 + x1) - H x̄), with x̄ the time mean
-``X.position_mean``; without it the second term is left out. The same with ``X.moment``, ``X.rotation``
-(integral of the angular velocity over the step, hence x0 = 0) and ``X.rotation_mean``.
+Where a component has a load as input, ``X.force``, and its motion as output, ``X.position`` (`LOADS`), the force that acts in
+a step is F + Ḟ (tau - t - H/2), so that its work is F·Δx + Ḟ·(H/2 (x0 + x1) - H x̄), with x̄ the time mean
+``X.position_mean``; without it the second term is left out. A rotation is counted from the start of the step: x0 = 0.
 
 The component that gives the load books the same work with what it knows: the load it has computed in the step and the
 motion it was told. The difference is the energy that the coupling makes; divided by the step it is the power residual
@@ -12,19 +11,15 @@ of Sadjina et al., Engineering with Computers 33 (2017) 607-620 (ECCO).
 
 from __future__ import annotations
 
+from collections.abc import Iterator
 from dataclasses import dataclass
 from typing import Any
 
 import numpy as np
 
-from orchestrator.coupling.exchange import suffixed
+from orchestrator.coupling.exchange import LOADS, MEAN, RATE, motion_of, split, suffixed
 from orchestrator.coupling.fmu.group import Group
 from orchestrator.coupling.graph.graph import Graph, Node
-
-PAIRS = {
-    "force": ("position", True),
-    "moment": ("rotation", False),
-}  # motion, and whether it is counted from the step's start
 
 
 @dataclass
@@ -35,19 +30,21 @@ class _Giver:
     ----------
     motion, mean : (m,) places in Graph.u where it is told motion and mean; `mean` may be empty
     rates : (m,) places in Graph.u of the slopes that it gives; empty: its load is that of an instant, linear between
+    from_start : whether the motion is counted from the start of the step
+    load, before : (m,) at the start of the step
     """
 
     motion: np.ndarray
     mean: np.ndarray
     rates: np.ndarray
-    relative: bool
+    from_start: bool
     load: np.ndarray
     before: np.ndarray
 
     def start(self, graph: Graph, loads: np.ndarray) -> None:
         """Begin at the present values."""
         self.load = graph.gathered(loads)
-        self.before = graph.u[self.motion] if self.relative else np.zeros(loads.size)
+        self.before = np.zeros(loads.size) if self.from_start else graph.u[self.motion]
 
     def work(self, graph: Graph, loads: np.ndarray, H: float) -> float:
         """Return the work that it says it has done on the receiver in this step, J."""
@@ -60,7 +57,7 @@ class _Giver:
                 slope, mean = graph.gathered(self.rates), graph.acted[self.mean]
                 total += slope.dot(H / 2 * (x0 + x1) - H * mean)
         self.load = given
-        if self.relative:
+        if not self.from_start:
             self.before = x1
         return float(total)
 
@@ -75,8 +72,8 @@ class _Interface:
     own: bool  # whether the master sets the rates
     motion: Group
     mean: Group | None
-    relative: bool
-    before: np.ndarray  # (m,)
+    from_start: bool  # whether the motion is counted from the start of the step
+    before: np.ndarray  # (m,) the motion at the start of the step
     giver: _Giver | None  # None where the source of the load is not told the motion
 
     def work(self, graph: Graph, H: float) -> float:
@@ -88,7 +85,7 @@ class _Interface:
         if self.mean is not None and self.rates.size:
             self.mean.get()
             total += slopes.take(self.rates).dot(H / 2 * (x0 + x1) - H * self.mean.values)
-        if self.relative:
+        if not self.from_start:
             self.before = x1.copy()
         return total
 
@@ -117,7 +114,7 @@ class Work:
 
     def __init__(self, graph: Graph):
         self.graph = graph
-        self.interfaces = [i for node in graph.nodes for i in _interfaces(graph, node)]
+        self.interfaces = [interface for node in graph.nodes for interface in _interfaces(graph, node)]
         self.names = [interface.name for interface in self.interfaces]
         self.total = np.zeros(len(self.names))
         self.residual = np.zeros(len(self.names))
@@ -127,7 +124,9 @@ class Work:
         self.total[:] = 0.0
         for i, interface in enumerate(self.interfaces):
             interface.motion.get()
-            interface.before = interface.motion.values.copy() if interface.relative else np.zeros(interface.loads.size)
+            interface.before = (
+                np.zeros(interface.loads.size) if interface.from_start else interface.motion.values.copy()
+            )
             self.residual[i] = np.nan if interface.giver is None else 0.0
             if interface.giver is not None:
                 interface.giver.start(self.graph, interface.loads)
@@ -151,61 +150,73 @@ class Work:
                 self.residual[i] += work - interface.giver.work(self.graph, interface.loads, h)
 
 
-def _interfaces(graph: Graph, node: Node) -> list[_Interface]:
-    place = {name: node.first + i for i, name in enumerate(node.inputs.names)}
+def _interfaces(graph: Graph, node: Node) -> Iterator[_Interface]:
+    """Yield the loads of a component whose motion it shows, vector by vector."""
     found: dict[str, list[str]] = {}
-    for name in place:
-        stem = name[:-2] if name[-2:] in (".x", ".y", ".z") else name
-        if stem.rpartition(".")[2] in PAIRS:
-            found.setdefault(stem, []).append(name)
-    own = {name: i for i, (part, name) in enumerate(graph.free_rates) if part == node.name}
-    interfaces = [_interface(graph, node, stem, names, place, own) for stem, names in found.items()]
-    return [interface for interface in interfaces if interface is not None]
+    for name in node.inputs.names:
+        where, last, _ = split(name)
+        if last in LOADS:
+            found.setdefault(where + last, []).append(name)
+    for stem, names in found.items():
+        pairs = [motion_of(name) for name in names]
+        motions, from_start = [motion for motion, _ in pairs], pairs[0][1]
+        if all(motion in node.fmu.ports and node.fmu.ports[motion].causality == "output" for motion in motions):
+            yield _interface(graph, node, stem, _Names(names, motions), from_start)
 
 
-def _interface(
-    graph: Graph, node: Node, stem: str, names: list[str], place: dict[str, int], own: dict[str, int]
-) -> _Interface | None:
-    load = stem.rpartition(".")[2]
-    motion, relative = PAIRS[load]
-    motions = [stem[: -len(load)] + motion + name[len(stem) :] for name in names]
-    means = [suffixed(name, "_mean") for name in motions]
-    rates = [suffixed(name, "_rate") for name in names]
-    by_master = all(name in own for name in rates)
-    where = own if by_master else place
-    ports = node.fmu.ports
-    if not all(name in ports and ports[name].causality == "output" for name in motions):
-        return None
-    loads = [place[name] for name in names]
+@dataclass(frozen=True)
+class _Names:
+    """The variables of an interface, the components of a vector each."""
+
+    loads: list[str]
+    motions: list[str]
+
+    @property
+    def rates(self) -> list[str]:
+        return [suffixed(name, RATE) for name in self.loads]
+
+    @property
+    def means(self) -> list[str]:
+        return [suffixed(name, MEAN) for name in self.motions]
+
+
+def _interface(graph: Graph, node: Node, stem: str, names: _Names, from_start: bool) -> _Interface:
+    fed = {name: node.first + i for i, name in enumerate(node.inputs.names)}
+    free = {name: i for i, (part, name) in enumerate(graph.free_rates) if part == node.name}
+    by_master = all(name in free for name in names.rates)
+    place = free if by_master else fed
+    loads, rates = (np.array([fed[n] for n in some if n in fed], dtype=np.intp) for some in (names.loads, names.rates))
     return _Interface(
         f"{node.name}.{stem}",
-        np.array(loads, dtype=np.intp),
-        np.array([where[name] for name in rates if name in where], dtype=np.intp),
+        loads,
+        np.array([place[name] for name in names.rates if name in place], dtype=np.intp),
         by_master,
-        node.fmu.group(motions),
-        node.fmu.group(means) if all(name in ports for name in means) else None,
-        relative,
-        np.zeros(len(names)),
-        _giver(graph, node, loads, [place[name] for name in rates if name in place], motions, means, relative),
+        node.fmu.group(names.motions),
+        node.fmu.group(names.means) if all(name in node.fmu.ports for name in names.means) else None,
+        from_start,
+        np.zeros(loads.size),
+        _giver(graph, node, names, loads, rates, from_start),
     )
 
 
 def _giver(
-    graph: Graph, node: Node, loads: list[int], rates: list[int], motions: list[str], means: list[str], relative: bool
+    graph: Graph, node: Node, names: _Names, loads: np.ndarray, rates: np.ndarray, from_start: bool
 ) -> _Giver | None:
     """Return the other side: one component that gives all of the load and is told all of the motion, or None."""
     givers = {graph.links[i].source[0] for i in loads}
     if len(givers) != 1:
         return None
     told = {link.source: i for i, link in enumerate(graph.links) if link.target[0] in givers}
-    motion, mean = ([told[node.name, x] for x in names if (node.name, x) in told] for names in (motions, means))
-    if len(motion) < len(motions):
+    motion, mean = (
+        np.array([told[node.name, name] for name in some if (node.name, name) in told], dtype=np.intp)
+        for some in (names.motions, names.means)
+    )
+    if motion.size < loads.size:
         return None
-    zero = np.zeros(len(loads))
-    m = len(loads)
-    return _Giver(_whole(motion, m), _whole(mean, m), _whole(rates, m), relative, zero, zero)
+    zero = np.zeros(loads.size)
+    return _Giver(motion, _whole(mean, loads.size), _whole(rates, loads.size), from_start, zero, zero)
 
 
-def _whole(places: list[int], m: int) -> np.ndarray:
+def _whole(places: np.ndarray, m: int) -> np.ndarray:
     """Return `places` (m,), or none of them where some are missing."""
-    return np.array(places if len(places) == m else [], dtype=np.intp)
+    return places if places.size == m else places[:0]

@@ -6,7 +6,7 @@ from collections import deque
 
 import numpy as np
 
-from orchestrator.coupling.exchange import suffixed
+from orchestrator.coupling.exchange import MEAN, RATE, exchange_named, is_load, is_motion
 from orchestrator.coupling.graph.graph import Graph, Node
 
 
@@ -52,23 +52,21 @@ class History:
 class Loads:
     """Which inputs are held as mean and slope over a step, and which a master may interpolate itself.
 
-    Names say it. An input with a ``_rate`` companion and no ``_mean`` companion is a load, held as `value` +
-    `rate` (tau - t - H/2). An input with a ``_mean`` companion is a motion, given at the end of the step.
-    Where a source feeds value *and* rate (or mean), it knows the course inside the step better than a master
-    does: those inputs are passed on as they come. All others are values at an instant.
+    Names say it (`orchestrator.coupling.exchange`). A load is held as `value` + `rate` (tau - t - H/2), a motion is given
+    at the end of the step. Where a source feeds value *and* rate (or mean), it knows the course inside the step better
+    than a master does: those inputs are passed on as they come. All others are values at an instant.
 
     Attributes
     ----------
     fed : (m, 2) int, places in `Graph.u` of a load and of its rate, where something feeds the rate
-    own : (m, 2) int, place in `Graph.u` of a load and place in `Graph.r` of its rate, which nothing feeds
     instant : (n,) int, places in `Graph.u` of values at an instant
     """
 
     def __init__(self, graph: Graph):
-        rate, mean = graph.companion("_rate"), graph.companion("_mean")
-        loads = np.flatnonzero((rate >= 0) & (mean < 0))
+        rate, mean = graph.companion(RATE), graph.companion(MEAN)
+        names = set(graph.input_names)
+        loads = np.array([i for i, name in enumerate(graph.input_names) if is_load(name, names)], dtype=np.intp)
         self.fed = np.stack([loads, rate[loads]], axis=1)
-        self.own = np.stack([graph.rate_of, np.arange(graph.r.size)], axis=1)
         passed = np.zeros(graph.u.size, dtype=bool)
         for companion in (rate, mean):
             passed[companion >= 0] = True
@@ -82,8 +80,8 @@ class Loads:
 def _takes_means(node: Node) -> bool:
     """Return whether a component has inputs for the time means of others, and does not hold its inputs all the same."""
     ports = node.fmu.ports
-    told = any(port.causality == "input" and suffixed(name, "_mean") in ports for name, port in ports.items())
-    return told and node.fmu.exchange != "held"
+    told = any(port.causality == "input" and is_motion(name, ports) for name, port in ports.items())
+    return told and not exchange_named(node.fmu.exchange).holds
 
 
 class Between:

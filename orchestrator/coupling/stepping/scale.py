@@ -2,16 +2,12 @@
 
 from __future__ import annotations
 
-import re
-
 import numpy as np
 
-from orchestrator.coupling.exchange import stems, vectors
+from orchestrator.coupling.exchange import force_beside, stems, vectors
 from orchestrator.coupling.graph.graph import Graph
 from orchestrator.coupling.kernel import kernel
 from orchestrator.coupling.stepping.interpolation import Loads
-
-MOMENT = re.compile(r"\b(moment|torque)$")
 
 
 class Scale:
@@ -38,7 +34,7 @@ class Scale:
         names = [graph.input_names[i] for i in graph.torn]
         self.vector = vectors(names)
         number = {stem: i for i, stem in enumerate(stems(names))}
-        self.force = np.array([number.get(MOMENT.sub("force", stem), i) for stem, i in number.items()], dtype=np.intp)
+        self.force = np.array([number.get(force_beside(stem), i) for stem, i in number.items()], dtype=np.intp)
         where = {int(place): i for i, place in enumerate(graph.torn)}
         self.load = np.arange(len(names))
         for load, rate in loads.fed.tolist():

@@ -2,24 +2,19 @@
 
 from __future__ import annotations
 
-import re
-
 import numpy as np
 
-from orchestrator.coupling.exchange import suffixed, vectors
+from orchestrator.coupling.exchange import EXCHANGES, is_motion, is_of_step, vectors
 from orchestrator.coupling.graph.graph import Graph, Node
 from orchestrator.coupling.stepping.loop import Loop
 from orchestrator.coupling.stepping.report import StepReport
 from orchestrator.coupling.stepping.scale import Scale
 
-ORDER = 4  # of the `waveform` exchange; a local error of order 5
+ORDER = EXCHANGES["waveform"].order  # a local error of one order more
 SAFETY = 0.5  # the controller aims at this share of the tolerance
 PROPORTIONAL, INTEGRAL = 0.4 / (ORDER + 1), 0.7 / (ORDER + 1)  # Hairer & Wanner 1996, IV.2, eq. (2.43c)
 SHORTEST, LONGEST = 0.2, 5.0  # change of the length from one sub-step to the next
 SMALLEST = 1e-4  # an error below this share of what is aimed at says no more; nor one so much above it
-
-# outputs that say something about the step, not about its end
-INTERVAL = re.compile(r"(_mean|\brotation)(\.[xyz])?$")
 
 
 class StepControl:
@@ -146,7 +141,7 @@ def joined(scale: Scale, first: np.ndarray, second: np.ndarray, h: float) -> np.
 class Range:
     """Peak-to-peak of the motions, by which their errors are measured.
 
-    A motion is an output, with a ``_mean`` companion, of a component whose inputs are all torn; if there is
+    A motion is an output, with a mean as its companion, of a component whose inputs are all torn; if there is
     none, any output at an instant. Means over the step and rotations within it belong to one length of step
     and are left out.
     """
@@ -154,7 +149,7 @@ class Range:
     def __init__(self, graph: Graph, absolute: float):
         self.graph, self.absolute = graph, absolute
         pairs = [(node, name) for node in graph.nodes for name in node.outputs.names]
-        instants = [i for i, (_, name) in enumerate(pairs) if not INTERVAL.search(name)]
+        instants = [i for i, (_, name) in enumerate(pairs) if not is_of_step(name)]
         motions = [i for i in instants if _is_motion(graph, *pairs[i])]
         self.places = np.array(motions or instants, dtype=np.intp)
         self.vector = vectors([f"{pairs[i][0].name}.{pairs[i][1]}" for i in self.places])
@@ -181,4 +176,4 @@ class Range:
 def _is_motion(graph: Graph, node: Node, name: str) -> bool:
     port = node.fmu.ports[name]
     moved = set(node.discrete_inputs.names) & (graph.feedthrough[node.name].get(port.variable) or frozenset())
-    return not node.forward.size and not moved and suffixed(name, "_mean") in node.fmu.ports
+    return not node.forward.size and not moved and is_motion(name, node.fmu.ports)

@@ -8,17 +8,34 @@ from dataclasses import dataclass, field
 
 import numpy as np
 
-from fmus.cable import dynamics
+from fmus.cable import ports
 from fmus.cable.module import Cable
-from fmus.contact.law import law_parameters
+from fmus.cable.state import make_work
+from fmus.contact import places as at
+from fmus.contact.law import LEFT, law_parameters
 from fmus.contact.module import Contact
 from fmus.kernels.rotations import follow_euler
 from fmus.kernels.time_integration import collocation
 from fmus.module.variables import ModuleError
-from fmus.robot import rigid_body
+from fmus.robot import dynamics
+from fmus.robot import rigid_body as rb
 from fmus.robot.module import Robot, body_parameters, initial_state
-from orchestrator.landing.monolithic import system as kernels
-from orchestrator.landing.monolithic.system import N_CONTACT, N_ROBOT, State, System
+from orchestrator.coupling.exchange import only_couples
+from orchestrator.landing.monolithic import control as steps
+from orchestrator.landing.monolithic.contacts import settle
+from orchestrator.landing.monolithic.state import (
+    ARC,
+    FRICTION_LOSS,
+    GONE,
+    N_CONTACT,
+    N_ROBOT,
+    OFF_CABLE,
+    OK,
+    WALL_LOSS,
+    State,
+    System,
+    make_space,
+)
 
 LONGEST = 9.4e-4
 """s; longest step at the default tolerance, it resolves the cable's waves (docs/verification.md)."""
@@ -81,53 +98,79 @@ class Integrator:
         contacts = np.stack([law_parameters(c.values, c.table) for c in problem.contacts])
         self.system = System(cable.model, self.method, prm, contacts, _control(robot, n_wheels))
         memory = np.zeros((n_wheels, N_CONTACT))
-        memory[:, kernels.S] = [c.values[c.table.index["initial.s"]] for c in problem.contacts]
+        memory[:, ARC] = [c.values[c.table.index["initial.s"]] for c in problem.contacts]
         start = initial_state(robot.values, robot.table)
         self.state = State(cable.state.copy(), start, np.zeros((2, N_ROBOT)), memory, np.zeros(1))
-        self.work = dynamics.make_work(cable.model.weight.size, cable.state.size)
-        self.space = kernels.make_space(cable.model.weight.size, n_wheels)
+        self.work = make_work(cable.model.weight.size, cable.state.size)
+        self.space = make_space(cable.model.weight.size, n_wheels)
         self.refinement = refinement
         self.longest = LONGEST * (tolerance / TOLERANCE) ** 0.25
         event = EVENT * (tolerance / TOLERANCE) ** 0.5
         self.control = np.array([0.02 * self.longest, self.longest, tolerance, event, NEWTON, 0.0, 0.0, 0.0, 0.0])
-        if kernels.settle(self.system, self.state, False, self.space, self.work) != kernels.OK:
+        if settle(self.system, self.state, False, self.space, self.work) != OK:
             raise ModuleError("monolithic: the contact law fails at the start; check the initial pose of the robot")
 
     @property
     def steps(self) -> int:
         """Number of steps made."""
-        return int(self.control[kernels.STEPS])
+        return int(self.control[steps.STEPS])
 
     def advance(self, t: float, end: float) -> None:
         """Integrate from `t` to `end` with controlled steps; raises `ModuleError` if none is short enough."""
         parts = self.refinement * max(1.0, np.ceil((end - t) / (self.refinement * self.longest) - 1e-9))
-        self.control[kernels.LONGEST] = (end - t) / parts
-        status, reached = kernels.advance(self.system, self.state, self.control, t, end, self.space, self.work)
-        if status == kernels.OFF_CABLE:
+        self.control[steps.LONGEST] = (end - t) / parts
+        status, reached = steps.advance(self.system, self.state, self.control, t, end, self.space, self.work)
+        if status == OFF_CABLE:
             raise ModuleError(
                 f"monolithic: a wheel has run past a support, off the cable, at t = {reached:g} s; "
                 "stop the run earlier, or brake the robot"
             )
-        if status != kernels.OK:
+        if status != OK:
             raise ModuleError(
                 f"monolithic: no step is short enough at t = {reached:g} s; check stiffness and damping of the contact"
             )
 
 
+def _contact_signals(out: np.ndarray, memory: np.ndarray) -> tuple[float, ...]:
+    """Return the signals of a contact in the order of `_Recorder.CONTACT`, from the law's results and its memory."""
+    return (
+        out[at.NORMAL],
+        np.hypot(out[at.FRICTION], out[at.FRICTION + 1]),
+        out[at.DEEPEST],
+        np.hypot(out[at.SLIP_VELOCITY], out[at.SLIP_VELOCITY + 1]),
+        out[at.CONTACT_LENGTH],
+        LEFT if memory[GONE] else out[at.STATUS],
+        memory[WALL_LOSS] + memory[FRICTION_LOSS],
+        out[at.WALL_ENERGY] + out[at.BRISTLE_ENERGY],
+        memory[ARC],
+    )
+
+
 def _control(robot: Robot, n_wheels: int) -> np.ndarray:
     """Return thrust, torque and drive torques, constant inputs of the robot, in the places of the kernels' loads."""
     value = {name: float(robot.values[robot.table.index[name]]) for name in robot.table.names("input")}
-    loads = np.zeros(rigid_body.BODY_LOADS + rigid_body.WHEEL_LOADS * n_wheels)
-    loads[:4] = value["thrust"], value["torque.x"], value["torque.y"], value["torque.z"]
+    loads = np.zeros(rb.BODY_LOADS + rb.WHEEL_LOADS * n_wheels)
+    loads[rb.THRUST] = value["thrust"]
+    loads[rb.TORQUE : rb.BODY_LOADS] = value["torque.x"], value["torque.y"], value["torque.z"]
     for k in range(n_wheels):
-        loads[rigid_body.BODY_LOADS + rigid_body.WHEEL_LOADS * k + 6] = value[f"wheel[{k + 1}].drive_torque"]
+        loads[rb.BODY_LOADS + rb.WHEEL_LOADS * k + rb.DRIVE] = value[f"wheel[{k + 1}].drive_torque"]
     return loads
 
 
 class _Recorder:
     """Writes the modules' own outputs at the output times."""
 
-    SKIP = ("_mean.", ".work", ".rotation", "_rate.")
+    CONTACT = (
+        "normal_force",
+        "friction_force",
+        "penetration",
+        "slip_velocity",
+        "contact_length",
+        "status",
+        "dissipated_energy",
+        "strain_energy",
+        "cable.s",
+    )
 
     def __init__(self, integrator: Integrator, n: int):
         self.integrator = integrator
@@ -137,43 +180,36 @@ class _Recorder:
         self.robot_names = self._names(self.robot.table.names("output"))
         self.cable_at = self.cable.table.indices(self.cable_names)
         self.robot_at = self.robot.table.indices(self.robot_names)
-        self.contact_names = (
-            "normal_force", "friction_force", "penetration", "slip_velocity", "contact_length", "status",
-            "dissipated_energy", "strain_energy", "cable.s",
-        )  # fmt: skip
         n_wheels = len(problem.contacts)
         self.cable_rows = np.zeros((n, len(self.cable_names)))
         self.robot_rows = np.zeros((n, len(self.robot_names)))
-        self.contact_rows = np.zeros((n, n_wheels, len(self.contact_names)))
+        self.contact_rows = np.zeros((n, n_wheels, len(self.CONTACT)))
         self._robot_state = self.robot.state.copy()
-        self._angles = self._robot_state[rigid_body.ANGLES : rigid_body.ANGLES + 3]
+        self._angles = self._robot_state[dynamics.ANGLES : dynamics.ANGLES + 3]
 
     def _names(self, names: Sequence[str]) -> list[str]:
-        return [name for name in names if not any(part in name for part in self.SKIP)]
+        return [name for name in names if not (only_couples(name) or ".work" in name)]
 
     def record(self, i: int) -> None:
         """Write row `i` from the present state."""
         state, system, space = self.integrator.state, self.integrator.system, self.integrator.space
-        kernels.settle(system, state, False, space, self.integrator.work)
+        settle(system, state, False, space, self.integrator.work)
         out = space.out[0]
         for k in range(len(state.contacts)):
             row, memory = out[k], state.contacts[k]
             first = self.cable.table.index[f"port[{k + 1}].s"]
-            self.cable.values[first] = memory[kernels.S]
-            self.cable.values[first + 1 : first + 7] = 0.0 if memory[kernels.LEFT] else row[:6]
-            self.contact_rows[i, k] = (
-                row[12], np.hypot(row[13], row[14]), row[15], np.hypot(row[16], row[17]), row[18],
-                3.0 if memory[kernels.LEFT] else row[19], memory[kernels.WALLS] + memory[kernels.FRICTION],
-                row[25] + row[26], memory[kernels.S],
-            )  # fmt: skip
+            self.cable.values[first + ports.S] = memory[ARC]
+            loads = self.cable.values[first + ports.FORCE : first + ports.FORCE_RATE]
+            loads[:] = 0.0 if memory[GONE] else row[at.CABLE_FORCE : at.WHEEL_FORCE]
+            self.contact_rows[i, k] = _contact_signals(row, memory)
         self.cable.state[:] = state.cable
         self.cable.show()
         self.cable_rows[i] = self.cable.values[self.cable_at]
-        self._robot_state[: rigid_body.RIGID] = state.robot
-        self._robot_state[rigid_body.CONTROL_WORK] = state.control_work[0]
-        follow_euler(state.robot[3:7], self._angles)
-        values = np.zeros(rigid_body.BODY_OUTPUTS + rigid_body.WHEEL_OUTPUTS * self.robot.n_wheels)
-        rigid_body.outputs(system.robot, self._robot_state, values)
+        self._robot_state[: rb.RIGID] = state.robot
+        self._robot_state[dynamics.CONTROL_WORK] = state.control_work[0]
+        follow_euler(state.robot[rb.ATTITUDE : rb.VELOCITY], self._angles)
+        values = np.zeros(dynamics.BODY_OUTPUTS + dynamics.WHEEL_OUTPUTS * self.robot.n_wheels)
+        dynamics.outputs(system.robot, self._robot_state, values)
         self.robot_rows[i] = values[self.robot_at - len(self.robot.table) + values.size]
 
     def signals(self) -> dict[str, np.ndarray]:
@@ -181,7 +217,7 @@ class _Recorder:
         found = {f"cable.{name}": self.cable_rows[:, j] for j, name in enumerate(self.cable_names)}
         found |= {f"robot.{name}": self.robot_rows[:, j] for j, name in enumerate(self.robot_names)}
         for k in range(self.contact_rows.shape[1]):
-            found |= {f"contact{k + 1}.{name}": self.contact_rows[:, k, j] for j, name in enumerate(self.contact_names)}
+            found |= {f"contact{k + 1}.{name}": self.contact_rows[:, k, j] for j, name in enumerate(self.CONTACT)}
         return found
 
 

@@ -1,0 +1,131 @@
+"""What acts and is seen at the ports: loads over a macro step, the motion there, the work done."""
+
+from __future__ import annotations
+
+import numpy as np
+
+from fmus.cable.assembly import add_load, curvature, interpolate
+from fmus.cable.state import N_PORTS, NOT_FINITE, OFF_CABLE, OK, WORK
+from fmus.kernels.jit import kernel
+
+# Places in a row of the loads `ports` (N_PORTS, 13); all but the first are those of three components.
+S, FORCE, MOMENT, FORCE_RATE, MOMENT_RATE = 0, 1, 4, 7, 10
+N_INPUTS = 13
+
+# Places in a row of what is shown (N_PORTS, 22): position, tangent, velocity, tangent rate; then
+MEANS, PORT_WORK, CURVATURE = 12, 18, 19
+N_SHOWN = 22
+
+
+@kernel
+def refusal(model, ports):
+    """Return OK, or why a step under the loads `ports` cannot be made."""
+    for k in range(N_PORTS):
+        for i in range(N_INPUTS):
+            if not abs(ports[k, i]) < np.inf:
+                return NOT_FINITE
+        if not 0.0 <= ports[k, S] <= model.s[-1]:
+            return OFF_CABLE
+    return OK
+
+
+@kernel
+def port_loads(model, q, ports, offset, work):
+    """Write what the ports apply at `offset` seconds from the middle of the macro step to ``work.external``."""
+    work.external[:] = 0.0
+    for k in range(N_PORTS):
+        loaded = False
+        for i in range(3):
+            work.load[0, i] = ports[k, FORCE + i] + ports[k, FORCE_RATE + i] * offset
+            work.load[1, i] = ports[k, MOMENT + i] + ports[k, MOMENT_RATE + i] * offset
+            loaded = loaded or work.load[0, i] != 0.0 or work.load[1, i] != 0.0
+        if loaded:
+            add_load(model, q, ports[k, S], work.load[0], work.load[1], work.shape, work.external)
+
+
+@kernel
+def moment_work(model, q, v, ports, offset, weight, sums, work):
+    """Add to the work of each port what its moment does: `weight` times the power at a stage."""
+    for k in range(N_PORTS):
+        moment = work.load[1]
+        loaded = False
+        for i in range(3):
+            moment[i] = ports[k, MOMENT + i] + ports[k, MOMENT_RATE + i] * offset
+            loaded = loaded or moment[i] != 0.0
+        if not loaded:
+            continue
+        interpolate(model, q, ports[k, S], work.shape, work.point[0])
+        interpolate(model, v, ports[k, S], work.shape, work.point[1])
+        g, gd = work.point[0, 3:6], work.point[1, 3:6]
+        square = g[0] * g[0] + g[1] * g[1] + g[2] * g[2]
+        power = moment[0] * (g[1] * gd[2] - g[2] * gd[1])
+        power += moment[1] * (g[2] * gd[0] - g[0] * gd[2])
+        power += moment[2] * (g[0] * gd[1] - g[1] * gd[0])
+        sums[WORK + k] += weight * power / square
+
+
+@kernel
+def port_motion(model, state, s, shape, out):
+    """Write position, tangent, velocity and tangent rate at arc length `s` to `out` (12,)."""
+    n = model.weight.size
+    interpolate(model, state[:n], s, shape, out[0:6])
+    interpolate(model, state[n : 2 * n], s, shape, out[6:12])
+
+
+@kernel
+def restart_means(model, state, ports, work):
+    """Clear the time means, and remember where the ports are at the start of a macro step."""
+    work.means[:, :] = 0.0
+    for k in range(N_PORTS):
+        port_motion(model, state, ports[k, S], work.shape, work.start[k])
+        for i in range(3):
+            work.first[k, i] = work.start[k, i]
+
+
+@kernel
+def add_to_means(model, state, ports, step, h, work):
+    """Add an inner step to the time means of position and tangent over the macro step `h`.
+
+    Over each inner step it is (x0 + x1)/2 + step/12 (x0' - x1'), the mean of the cubic through its ends.
+    """
+    point = work.point.reshape(12)
+    for k in range(N_PORTS):
+        start = work.start[k]
+        port_motion(model, state, ports[k, S], work.shape, point)
+        for i in range(6):
+            mean = 0.5 * (start[i] + point[i]) + step / 12.0 * (start[6 + i] - point[6 + i])
+            work.means[k, i] += mean * step / h
+        for i in range(12):
+            start[i] = point[i]
+
+
+@kernel
+def force_work(ports, h, sums, work):
+    """Add to the work of each port what its force has done over the macro step `h`.
+
+    By parts, F·Δx + Ḟ·(h/2 (x0 + x1) - h x̄) is the integral of the power of a force with mean F and slope Ḟ.
+    """
+    for k in range(N_PORTS):
+        for i in range(3):
+            force, rate = ports[k, FORCE + i], ports[k, FORCE_RATE + i]
+            first, end = work.first[k, i], work.start[k, i]
+            sums[WORK + k] += force * (end - first) + rate * h * (0.5 * (first + end) - work.means[k, i])
+
+
+@kernel
+def show_ports(model, state, ports, shown, work):
+    """Write position, tangent, velocity, tangent rate and d²r/ds² of every port to `shown` (N_PORTS, 22)."""
+    n = model.weight.size
+    for k in range(N_PORTS):
+        port_motion(model, state, ports[k, S], work.shape, shown[k, 0:MEANS])
+        curvature(model, state[:n], ports[k, S], work.shape, shown[k, CURVATURE:N_SHOWN])
+
+
+@kernel
+def show_step(model, state, ports, shown, work):
+    """Write what is shown of every port after a macro step: motion, time means, work."""
+    show_ports(model, state, ports, shown, work)
+    for k in range(N_PORTS):
+        for i in range(6):
+            shown[k, MEANS + i] = work.means[k, i]
+        shown[k, PORT_WORK] = state[4 * model.weight.size + WORK + k]
