@@ -91,7 +91,8 @@ def test_it_lists_runs_and_compares_in_an_empty_folder(installed):
     assert again.returncode == 0 and "compil" not in again.stderr and "building" not in again.stderr
     assert [path.name for path in installed.work.iterdir()] == ["runs"]
     kept = installed.home / ".cache" / "line-landing"
-    assert ((kept / "kernels").is_dir() and list((kept / "fmus").glob("robot*.fmu"))) or list((kept / "fmus").iterdir())
+    assert {path.name.partition("-")[0] for path in (kept / "fmus").iterdir()} >= {"cable", "contact", "fptlir"}
+    assert list((kept / "kernels").glob("*/*/*.nbi"))
 
 
 def test_with_nothing_to_write_to_but_the_temporary_folder(installed):
