@@ -7,10 +7,10 @@ import numpy as np
 from scipy.linalg import expm
 
 from fmus.face.build import ensure_fmu
-from fmus.oscillator.oscillator_fmu import RECIPE
+from fmus.module.registry import find
 from orchestrator.coupling import Fmu, Graph, simulate
 
-file = ensure_fmu(RECIPE, Path(tempfile.mkdtemp()))  # any FMU for co-simulation would do
+file = ensure_fmu(find("oscillator").recipe(), Path(tempfile.mkdtemp()))  # any FMU for co-simulation would do
 left, right = Fmu(file), Fmu(file)
 left.set_parameters({"mass": 1.0, "stiffness": 10.0, "initial_position": 1.0})
 right.set_parameters({"mass": 1.0, "stiffness": 10.0, "coupling_stiffness": 100.0})

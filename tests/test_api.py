@@ -2,8 +2,10 @@
 
 import json
 import os
+import signal
 import subprocess
 import sys
+from concurrent.futures import ThreadPoolExecutor
 from pathlib import Path
 
 import matplotlib
@@ -53,13 +55,13 @@ def test_every_name_is_there():
 
 
 def test_signals_are_labelled_arrays(oscillator: orchestrator.Run):
-    signal = oscillator["left.position"]
-    assert (signal.name, signal.unit, len(signal)) == ("left.position", "m", 51)
-    assert np.array_equal(signal.time, np.arange(51) * 0.01) and np.array_equal(signal.time, oscillator.time)
-    assert np.max(np.abs(np.asarray(signal) - exact_oscillator(signal.time)[0])) < 1e-5
-    assert signal[-1] == signal.values[-1] and list(signal) == signal.values.tolist()
-    assert np.array(signal, copy=True) is not signal.values and np.ptp(signal) == np.ptp(signal.values)
-    assert repr(signal) == "Signal(left.position [m], 51 values)"
+    left = oscillator["left.position"]
+    assert (left.name, left.unit, len(left)) == ("left.position", "m", 51)
+    assert np.array_equal(left.time, np.arange(51) * 0.01) and np.array_equal(left.time, oscillator.time)
+    assert np.max(np.abs(np.asarray(left) - exact_oscillator(left.time)[0])) < 1e-5
+    assert left[-1] == left.values[-1] and list(left) == left.values.tolist()
+    assert np.array(left, copy=True) is not left.values and np.ptp(left) == np.ptp(left.values)
+    assert repr(left) == "Signal(left.position [m], 51 values)"
     assert oscillator.signals["right.velocity"].unit == "m/s" and "time" not in oscillator.signals
 
 
@@ -147,6 +149,23 @@ def test_progress_is_told():
     orchestrator.run(OSCILLATOR, stop=0.1, macro_step=0.05, progress=lambda *what: told.append(what))
     assert told[:2] == [("iqn_ils_0.05s", 0.05, 0.1), ("iqn_ils_0.05s", 0.1, 0.1)]
     assert {task for task, _, _ in told[2:]} == {"error estimate, finer run"}
+
+
+def test_a_run_in_a_thread(oscillator: orchestrator.Run):
+    """As in a server or a notebook's widget; signals of the system belong to the main thread."""
+    with ThreadPoolExecutor(1) as pool:
+        run = pool.submit(orchestrator.run, OSCILLATOR, stop=0.5).result()
+    assert same(run.table, oscillator.table)
+
+
+def test_ctrl_c_keeps_what_was_reached():
+    def press(task: str, time: float, stop: float) -> None:
+        if time > 0.1:
+            signal.raise_signal(signal.SIGINT)
+
+    run = orchestrator.run(OSCILLATOR, **SHORT, progress=press)
+    assert (run.verdict, run.exit_status, run.error) == ("interrupted", 130, "interrupted at t = 0.11 s")
+    assert run.time[-1] == pytest.approx(0.11)
 
 
 def test_wrong_input_names_all_problems():

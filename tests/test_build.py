@@ -16,11 +16,12 @@ from fmus.face import build, first_use, lock
 from fmus.face.build import ensure_fmu, kept
 from fmus.face.lock import locked
 from fmus.kernels import cache, jit
+from fmus.module import registry
 from fmus.module.variables import ModuleError
-from fmus.oscillator.oscillator_fmu import RECIPE
 from orchestrator.catalogue import library
 from orchestrator.coupling.errors import InputError
 
+RECIPE = registry.find("oscillator").recipe()
 HOLD = "import sys, time; from pathlib import Path; from fmus.face.lock import locked\n"
 HOLD += "with locked(Path(sys.argv[1])): print('held', flush=True); time.sleep(60)"
 
@@ -113,9 +114,9 @@ def test_threads_take_turns_and_leave_no_file(tmp_path):
 
 def test_four_processes_that_need_an_fmu_at_once_build_it_once(tmp_path):
     code = "import sys; from pathlib import Path; from fmus.face import build\n"
-    code += "from fmus.oscillator.oscillator_fmu import RECIPE\n"
+    code += "from fmus.module.registry import find\n"
     code += "made = []; before = build._build; build._build = lambda *a: (made.append(1), before(*a))[1]\n"
-    code += "print(build.kept(RECIPE, Path(sys.argv[1])).ensured().name, len(made))"
+    code += "print(build.kept(find('oscillator').recipe(), Path(sys.argv[1])).ensured().name, len(made))"
     with ThreadPoolExecutor(4) as pool:
         done = list(pool.map(lambda _: run_python(code, tmp_path), range(4)))
     assert [d.returncode for d in done] == [0] * 4, [d.stderr for d in done]

@@ -6,20 +6,22 @@ import fmpy
 import pytest
 from fmpy.validation import validate_fmu
 
-from fmus.face.build import build_fmu, recipes
+from fmus.face.build import build_fmu
+from fmus.module import registry
 from tests.fmi import Instance
 
 STARTS = {
     "cable": {"port[1].force.z": -50.0, "port[1].s": 80.0},
     "contact": {"wheel.position.z": 0.06},  # in touch
     "robot": {"thrust": 100.0, "wheel[1].force.x": 5.0},
+    "oscillator": {"coupling_stiffness": 2.0, "coupling_damping": 0.1, "force": 1.0, "neighbour.position": 0.1},
 }
 """Inputs that bring every mechanism of the module into play."""
 
 
-@pytest.fixture(scope="module", params=recipes(), ids=lambda recipe: recipe.name)
+@pytest.fixture(scope="module", params=registry.OURS)
 def path(request, tmp_path_factory):
-    return build_fmu(request.param, tmp_path_factory.mktemp("fmu"))
+    return build_fmu(registry.find(request.param).recipe(), tmp_path_factory.mktemp("fmu"))
 
 
 @pytest.fixture(scope="module")

@@ -12,8 +12,8 @@ from scipy.special import ellipj, ellipk
 
 from fmus.kernels.rotations import quaternion_rate
 from fmus.module.variables import ModuleError
-from fmus.robot import Robot, rigid_body, robot_table
-from fmus.robot.module import body_parameters, initial_state
+from fmus.robot import rigid_body
+from fmus.robot.module import Robot, body_parameters, initial_state, robot_table
 
 EPS = np.finfo(float).eps
 GENERAL = {

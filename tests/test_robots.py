@@ -4,7 +4,7 @@ import math
 
 import pytest
 
-from fmus.robot import Robot
+from fmus.robot.module import Robot
 from orchestrator.catalogue import listing, robot_spec
 from orchestrator.catalogue.library import robot_fmu, robot_recipe
 from orchestrator.catalogue.modules import of_fmu

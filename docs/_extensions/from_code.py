@@ -13,8 +13,8 @@ from typing import Any, get_args, get_type_hints
 
 from plain_docstrings import LITERAL, sections
 
+from fmus.module import registry
 from fmus.module.variables import Variable, VariableTable
-from fmus.robot.module import robot_table
 
 HEADINGS = {"parameter": "Parameters", "input": "Inputs", "output": "Outputs"}
 
@@ -89,12 +89,7 @@ def variables_page(title: str, table: VariableTable) -> str:
 
 def tables() -> dict[str, VariableTable]:
     """Return the variable table of every module; the robot's is that of one wheel."""
-    from orchestrator.catalogue.modules import MODELS
-
-    found = {}
-    for name, (file, class_name) in MODELS.items():
-        found[name] = getattr(__import__(file, fromlist=[class_name]), class_name).table
-    return found | {"robot": robot_table(1)}
+    return {key: registry.find(key).table() for key in registry.OURS}
 
 
 # -- masters ------------------------------------------------------------------------------------------------------

@@ -1,6 +1,6 @@
 """The build: from a recipe to an FMU, the same bytes from the same input.
 
-    python -m fmus.face.build [--out DIR]        builds cable, contact and robot, without --out in the user's cache
+    python -m fmus.face.build [--out DIR]        builds those of our modules, without --out in the user's cache
 
 An FMU holds the binary of pythonfmu, a script of its own name, and a copy of the sources under a name made of
 their hash (see fmu_start.py). Each is put together in a process of its own, which imports that copy and reads
@@ -40,6 +40,7 @@ from fmus.face.model_description import documentation, model_description
 from fmus.kernels import cache
 from fmus.kernels.cache import user_folder
 from fmus.kernels.notice import notice
+from fmus.module import registry
 from fmus.module.recipe import FmuRecipe, make_module
 from fmus.module.variables import ModuleError, VariableTable
 
@@ -325,12 +326,6 @@ def write_atomically(path: Path, content: bytes) -> None:
         raise
 
 
-def recipes() -> list[FmuRecipe]:
-    """Return the recipes of the FMUs that need no catalogue."""
-    names = ("fmus.cable.cable_fmu", "fmus.contact.contact_fmu", "fmus.robot.robot_fmu")
-    return [importlib.import_module(name).RECIPE for name in names]
-
-
 def main() -> None:
     """Build every FMU, or (in the process of one FMU) assemble the recipe on the standard input."""
     parser = argparse.ArgumentParser(prog="python -m fmus.face.build", description="Build the FMUs.")
@@ -341,8 +336,9 @@ def main() -> None:
         if options.assemble:
             write_atomically(options.assemble, assemble(FmuRecipe(**json.load(sys.stdin))))
         else:
+            recipes = [registry.find(key).recipe() for key in registry.OURS]
             out = options.out
-            print(*ensure_all(plain(r, out) if out else kept(r, user_folder("fmus")) for r in recipes()), sep="\n")
+            print(*ensure_all(plain(r, out) if out else kept(r, user_folder("fmus")) for r in recipes), sep="\n")
     except ModuleError as error:
         sys.exit(str(error))
 

@@ -21,9 +21,10 @@ from fmus.face.lock import locked
 from fmus.kernels.cache import user_folder
 from fmus.kernels.jit import is_compiled
 from fmus.kernels.notice import notice
+from fmus.module import registry
 from fmus.module.variables import ModuleError
 
-LANDING = ("cable", "contact", "robot")
+LANDING = tuple(key for key in registry.OURS if registry.MODULES[key].contract)
 """The modules of a landing; those that take longest come first."""
 
 
@@ -41,9 +42,10 @@ def compile_modules(names: Sequence[str] = LANDING) -> None:
 
 
 def _uncompiled(names: Sequence[str]) -> list[str]:
-    for name in names:
-        import_module(f"fmus.{name}.module")
-    return [name for name in names if not is_compiled(f"fmus.{name}")]
+    files = {name: registry.find(name).factory.partition(":")[0] for name in names}
+    for file in files.values():
+        import_module(file)
+    return [name for name, file in files.items() if not is_compiled(file.rpartition(".")[0])]
 
 
 def _compile_elsewhere(name: str) -> None:
@@ -55,7 +57,7 @@ def _compile_elsewhere(name: str) -> None:
 
 def compile_module(name: str) -> None:
     """Call every kernel of a module that a run calls."""
-    recipe = import_module(f"fmus.{name}.{name}_fmu").RECIPE
+    recipe = registry.find(name).recipe()
     module = recipe.make_module()
     module.initialize(0.0)
     module.step(0.0, recipe.step_size)

@@ -7,33 +7,34 @@ from __future__ import annotations
 
 import os
 from collections.abc import Callable, Iterable
-from importlib import import_module
 from pathlib import Path
 
 from fmus.kernels.cache import prune, used, user_folder
+from fmus.module import registry
 from fmus.module.recipe import FmuRecipe
 from orchestrator.catalogue.robot_spec import RobotSpec, catalogue
 from orchestrator.coupling.errors import InputError
 
-MODULES = ("cable", "contact", "oscillator")
-"""Our modules with one FMU each; robots have one for each entry of the catalogue."""
-
 
 def module_fmu(name: str) -> Path:
-    """Return the FMU of one of `MODULES`, up to date."""
+    """Return the FMU of a module of the registry, up to date."""
     return kept([module_recipe(name)])[0]
 
 
 def module_recipe(name: str) -> FmuRecipe:
-    """Return the recipe of one of `MODULES`."""
-    return import_module(f"fmus.{name}.{name}_fmu").RECIPE
+    """Return the recipe of a module of the registry."""
+    return registry.find(name).recipe()
+
+
+def robot_fmu(robot: RobotSpec) -> Path:
+    """Return the FMU of a robot, up to date."""
+    return kept([robot_recipe(robot)])[0]
 
 
 def robot_recipe(robot: RobotSpec) -> FmuRecipe:
     """Return the recipe of a robot."""
-    from fmus.robot.robot_fmu import robot_recipe
-
-    return robot_recipe(robot.fmu_name, robot.n_wheels, robot.parameters, robot.title)
+    wheels = {"n_wheels": robot.n_wheels}
+    return registry.find("robot").recipe(robot.fmu_name, robot.title, wheels, robot.parameters)
 
 
 def build_all(folder: Path | None) -> list[Path]:
@@ -44,7 +45,8 @@ def build_all(folder: Path | None) -> list[Path]:
     from fmus.face.build import ensure_all, plain
     from fmus.face.first_use import compile_modules
 
-    recipes = (*map(module_recipe, MODULES), *map(robot_recipe, catalogue().values()))
+    ours = [module_recipe(key) for key in registry.OURS if key != "robot"]  # robots: those of the catalogue
+    recipes = (*ours, *map(robot_recipe, catalogue().values()))
     if folder is None:
         compile_modules()
         return kept(recipes)

@@ -3,42 +3,32 @@
 from __future__ import annotations
 
 import zipfile
-from importlib import import_module
 from pathlib import Path
 from typing import Any
 
-from fmus.module.variables import Bounds, Kind, Value, Variable
+from fmus.module import registry
+from fmus.module.variables import Bounds, Kind, ModuleError, Value, Variable
 from orchestrator.coupling.errors import InputError
-
-MODELS = {
-    "cable": ("fmus.cable.module", "Cable"),
-    "contact": ("fmus.contact.module", "Contact"),
-    "oscillator": ("fmus.oscillator.module", "Oscillator"),
-}
-"""Our modules with one table each: file and class."""
 
 
 def of_module(kind: str, robot: str | None = None) -> dict[str, Variable]:
-    """Return the variables of our own module by name, from its table.
+    """Return the variables of a module of the registry by name; raise `InputError` if it cannot be found.
 
     Parameters
     ----------
-    kind : one of `MODELS`, or ``robot``
+    kind : key of the registry
     robot : name of the catalogue, or path of a TOML file; the number of its wheels decides which variables there are
     """
-    if kind == "robot":
+    arguments: dict[str, Value] = {}
+    if robot is not None:
         from orchestrator.catalogue.robot_spec import load_robot
 
-        return robot_variables(load_robot(robot).n_wheels if robot is not None else 1)
-    file, name = MODELS[kind]
-    return {v.name: v for v in getattr(import_module(file), name).table.variables}
-
-
-def robot_variables(n_wheels: int) -> dict[str, Variable]:
-    """Return the variables of our robot module with `n_wheels` wheels by name."""
-    from fmus.robot.module import robot_table
-
-    return {v.name: v for v in robot_table(n_wheels).variables}
+        arguments["n_wheels"] = load_robot(robot).n_wheels
+    try:
+        table = registry.find(kind).table(**arguments)
+    except ModuleError as error:
+        raise InputError(str(error)) from None
+    return {v.name: v for v in table.variables}
 
 
 def of_fmu(path: Path) -> dict[str, Variable]:

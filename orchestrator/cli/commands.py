@@ -16,17 +16,7 @@ import typer
 from typer.core import TyperGroup
 
 import orchestrator
-from orchestrator.cli import new
-from orchestrator.cli.printing import (
-    complain,
-    complain_of,
-    markup,
-    print_comparison,
-    print_run,
-    print_table,
-    progress_bars,
-)
-from orchestrator.coupling.errors import DONE, FAILED, INTERRUPTED, MISSED, InputError, OrchestratorError
+from orchestrator.cli import new, options, printing
 
 
 class Commands(TyperGroup):
@@ -34,60 +24,68 @@ class Commands(TyperGroup):
 
     def invoke(self, ctx: Any) -> Any:
         """Carry out one command."""
-        warnings.showwarning = lambda message, *_: complain(str(message))
+        warnings.showwarning = lambda message, *_: printing.complain(str(message))
         try:
             return super().invoke(ctx)
-        except OrchestratorError as error:
-            for line in str(error).splitlines():
-                complain(line)
-            raise typer.Exit(error.exit_status) from None
-        except BrokenPipeError:
-            raise
-        except OSError as error:  # a full disk, a folder that was taken away
-            complain(f"{error.filename or 'results'}: {error.strerror}; make room or choose another place with --out")
-            raise typer.Exit(FAILED) from None
-        except KeyboardInterrupt:
-            complain("interrupted")
-            raise typer.Exit(INTERRUPTED) from None
+        except (Exception, KeyboardInterrupt) as error:
+            status = _explained(error)
+            if status is None:
+                raise
+            raise typer.Exit(status) from None
+
+
+def _explained(error: BaseException) -> int | None:
+    """Say on stderr what ended a command and return its exit status; None where that is for others to say."""
+    from orchestrator.coupling.errors import FAILED, INTERRUPTED, OrchestratorError
+
+    if isinstance(error, OrchestratorError):
+        for line in str(error).splitlines():
+            printing.complain(line)
+        return error.exit_status
+    if isinstance(error, KeyboardInterrupt):
+        printing.complain("interrupted")
+        return INTERRUPTED
+    if isinstance(error, OSError) and not isinstance(
+        error, BrokenPipeError
+    ):  # a full disk, a folder that was taken away
+        cure = "make room or choose another place with --out"
+        printing.complain(f"{error.filename or 'results'}: {error.strerror}; {cure}")
+        return FAILED
+    return None
 
 
 app = typer.Typer(
     cls=Commands,
-    add_completion=False,
     no_args_is_help=True,
     pretty_exceptions_enable=False,
+    rich_markup_mode=None,  # plain text: half the time, and a pipe or an ASCII terminal shows it as it is
+    context_settings={"help_option_names": ["-h", "--help"]},
     help="Land power-line robots on a flexible cable: FMUs coupled, and held against a monolithic solver.",
     epilog="Exit status: 0 done and within tolerance; 1 a tolerance or safety limit is missed; "
     "2 wrong input; 3 the run failed; 130 interrupted.",
 )
-
 app.add_typer(new.app, name="new")
 
-ScenarioFile = Annotated[
-    str, typer.Argument(metavar="SCENARIO", help="A shipped scenario's name, or a scenario file (TOML).")
-]
-Out = Annotated[
-    Path | None, typer.Option(help="Directory of the results; it must not exist. Default: runs/SCENARIO-NNN.")
-]
-Robot = Annotated[
-    str | None, typer.Option(metavar="NAME|FILE.toml|FILE.fmu", help="Another robot in the scenario's place.")
-]
-MasterName = Annotated[str | None, typer.Option(help="Another master, see `orchestrator list`.")]
-MacroStep = Annotated[float | None, typer.Option(help="Another macro step, s.")]
-Stop = Annotated[float | None, typer.Option(help="Another stop time, s.")]
-Timeout = Annotated[float | None, typer.Option(help="Wall time that one step of an FMU may take, s.")]
-Set = Annotated[
-    list[str] | None,
-    typer.Option("--set", metavar="KEY=VALUE", help="Another value, e.g. robot.parameters.mass=12; repeatable."),
-]
-Quiet = Annotated[bool, typer.Option("--quiet", help="No progress.")]
+
+def _print_version(asked: bool) -> None:
+    if asked:
+        print(f"orchestrator {orchestrator.__version__}")
+        raise typer.Exit
+
+
+@app.callback()
+def program(
+    version: Annotated[
+        bool, typer.Option("--version", callback=_print_version, is_eager=True, help="Show the version and end.")
+    ] = False,
+) -> None: ...
 
 
 @app.command()
 def build(
     out: Annotated[Path | None, typer.Option(help="Folder of the FMUs. Default: the cache that runs use.")] = None,
 ) -> None:
-    """Build the FMUs of cable, contact and every robot of the catalogue; print where they are."""
+    """Build the FMUs of all modules and robots, and print where they are."""
     from orchestrator.catalogue.library import build_all
 
     for path in build_all(out):
@@ -96,33 +94,23 @@ def build(
 
 @app.command("list")
 def list_() -> None:
-    """List scenarios, robots and masters, with a line each."""
-    from rich.table import Table
+    """List scenarios, robots and masters."""
+    from orchestrator.catalogue import listing
 
-    from orchestrator.catalogue import listing as catalogue
-
-    groups = {
-        "Scenarios": catalogue.scenarios(),
-        "Robots": catalogue.robots(),
-        "Masters": catalogue.masters(),
-    }
-    table = Table(box=None, show_header=False, pad_edge=False)
-    for title, lines in groups.items():
-        table.add_row(f"[bold]{title}[/bold]")
-        for name, line in lines.items():
-            table.add_row(f"  {name}", line)
-    print_table(table)
+    groups = {"Scenarios": listing.scenarios(), "Robots": listing.robots(), "Masters": listing.masters()}
+    printing.print_catalogue(groups)
 
 
 @app.command()
-def validate(scenario: ScenarioFile, robot: Robot = None, set_: Set = None) -> None:
-    """Parse, load, check connections, units and contract; nothing is run."""
+def validate(scenario: options.Scenario, robot: options.Robot = None, set_: options.Set = None) -> None:
+    """Check a scenario; nothing is run.
+
+    Parsed and loaded, with connections, units and contracts.
+    """
     from orchestrator.api import load_scenario
     from orchestrator.runs.components import master_of, opened
 
     loaded = load_scenario(scenario, set=set_, robot=robot)
-    for note in loaded.notes:
-        complain(note)
     with opened(loaded) as graph:
         master_of(loaded, graph)
         print(f"{scenario}: valid; {len(graph.components)} FMUs, {len(list(graph.connections))} connections")
@@ -135,17 +123,12 @@ def check(
         str | None, typer.Option(help="robot, cable or contact. Default: the one it suits best.")
     ] = None,
 ) -> None:
-    """Check point by point whether an FMU meets the contract of a robot, a cable or a contact."""
-    from rich.table import Table
-
+    """Check an FMU against a contract, point by point: that of a robot, a cable or a contact."""
+    from orchestrator.coupling.errors import DONE, MISSED
     from orchestrator.landing.contract import check_fmu, is_met
 
     kind, findings = check_fmu(fmu, contract)
-    colours = {"ok": "green", "missing": "red", "wrong": "red", "advice": "yellow"}
-    table = Table(f"{kind} contract", "", "", box=None, pad_edge=False, header_style="bold")
-    for finding in findings:
-        table.add_row(finding.what, f"[{colours[finding.verdict]}]{finding.verdict}[/]", markup(finding.note))
-    print_table(table)
+    printing.print_findings(kind, findings)
     met = is_met(findings)
     print(f"{fmu}: {'meets' if met else 'does not meet'} the {kind} contract")
     raise typer.Exit(DONE if met else MISSED)
@@ -153,18 +136,19 @@ def check(
 
 @app.command()
 def run(
-    scenario: ScenarioFile,
-    out: Out = None,
-    robot: Robot = None,
-    master: MasterName = None,
-    macro_step: MacroStep = None,
-    stop: Stop = None,
-    timeout: Timeout = None,
-    set_: Set = None,
-    quiet: Quiet = False,
+    scenario: options.Scenario,
+    out: options.Out = None,
+    robot: options.Robot = None,
+    master: options.Master = None,
+    macro_step: options.MacroStep = None,
+    stop: options.Stop = None,
+    timeout: options.Timeout = None,
+    set_: options.Set = None,
+    no_pictures: options.NoPictures = False,
+    quiet: options.Quiet = False,
 ) -> None:
     """Run a scenario coupled."""
-    with progress_bars(quiet) as progress:
+    with printing.progress_bars(quiet) as progress:
         done = orchestrator.run(
             scenario,
             set=set_,
@@ -175,32 +159,34 @@ def run(
             timeout=timeout,
             out=True if out is None else out,
             progress=progress,
+            pictures=not no_pictures,
         )
-    print_run(done)
+    printing.print_run(done)
     print(f"results in {done.directory}")
-    complain_of([done])
+    printing.complain_of([done])
     raise typer.Exit(done.exit_status)
 
 
 @app.command()
 def compare(
-    scenario: ScenarioFile,
-    out: Out = None,
-    robot: Robot = None,
-    master: MasterName = None,
-    macro_step: MacroStep = None,
-    stop: Stop = None,
-    timeout: Timeout = None,
-    set_: Set = None,
-    masters: Annotated[str | None, typer.Option(metavar="A,B,…", help="Masters to compare.")] = None,
-    macro_steps: Annotated[str | None, typer.Option(metavar="H,H,…", help="Macro steps to compare, s.")] = None,
-    quiet: Quiet = False,
+    scenario: options.Scenario,
+    out: options.Out = None,
+    robot: options.Robot = None,
+    master: options.Master = None,
+    macro_step: options.MacroStep = None,
+    stop: options.Stop = None,
+    timeout: options.Timeout = None,
+    set_: options.Set = None,
+    masters: options.Masters = None,
+    macro_steps: options.MacroSteps = None,
+    no_pictures: options.NoPictures = False,
+    quiet: options.Quiet = False,
 ) -> None:
-    """Run a scenario coupled and with the monolithic solver, and say how large the coupling error is."""
+    """Run coupled and monolithic, and say the error of the coupling."""
     from orchestrator.api import Unfinished
 
     try:
-        with progress_bars(quiet) as progress:
+        with printing.progress_bars(quiet) as progress:
             done = orchestrator.compare(
                 scenario,
                 masters=_items(masters),
@@ -213,51 +199,53 @@ def compare(
                 timeout=timeout,
                 out=True if out is None else out,
                 progress=progress,
+                pictures=not no_pictures,
             )
     except Unfinished as error:
-        complain_of(error.runs)
+        printing.complain_of(error.runs)
         print(f"results so far in {error.directory}")
         raise
-    print_comparison(done)
-    folder = done.directory
-    print(f"verdict: {'pass' if done.passed else 'FAIL'}; results in {folder}, pictures in {folder}/plots")
-    complain_of(done.results)
+    printing.print_comparison(done)
+    pictures = "" if no_pictures else f", pictures in {done.directory}/plots"
+    print(f"verdict: {'pass' if done.passed else 'FAIL'}; results in {done.directory}{pictures}")
+    printing.complain_of(done.results)
     raise typer.Exit(done.exit_status)
 
 
 @app.command()
 def modes(
-    scenario: ScenarioFile,
+    scenario: options.Scenario,
     count: Annotated[int, typer.Option(help="Number of modes out of the vertical plane, and in it.")] = 6,
     out: Annotated[Path | None, typer.Option(help="Directory for table and picture; it must not exist.")] = None,
-    set_: Set = None,
+    set_: options.Set = None,
 ) -> None:
-    """Natural frequencies, damping ratios and shapes of the scenario's cable about its static equilibrium."""
-    from rich.table import Table
+    """Natural frequencies of a scenario's cable.
 
+    With damping ratios and shapes, about its static equilibrium.
+    """
     from orchestrator.api import load_scenario
-    from orchestrator.landing import modes as vibration
-    from orchestrator.report.modes import write as write_modes
+    from orchestrator.landing.modes import of_scenario
+    from orchestrator.report.modes import draw
+    from orchestrator.runs.directory import claimed
+    from orchestrator.runs.modes import write_modes
 
-    if out is not None and out.exists():
-        raise InputError(f"{out}: exists already; remove it or choose another with --out")
-    found = vibration.of_scenario(load_scenario(scenario, set=set_), count)
-    table = Table("mode", "out of plane \\[Hz]", "damping", "in plane \\[Hz]", "damping", box=None, pad_edge=False)
-    groups = (found.out_of_plane, found.in_plane)
-    for k in range(max(group.frequency.size for group in groups)):
-        cells = [f"{x[k]:{form}}" if k < x.size else "" for g in groups for x, form in g.columns()]
-        table.add_row(str(k + 1), *cells)
-    print_table(table)
-    if out is not None:
-        write_modes(found, out)
-        print(f"table and picture in {out}")
+    loaded = load_scenario(scenario, set=set_)
+    if out is None:
+        printing.print_modes(of_scenario(loaded, count))
+        return
+    with claimed(out, loaded.name) as directory:
+        found = of_scenario(loaded, count)
+        printing.print_modes(found)
+        write_modes(directory, found)
+        draw(out)
+    print(f"table and picture in {out}")
 
 
 @app.command()
 def report(
     directory: Annotated[Path, typer.Argument(metavar="DIR", help="Directory of a finished run.")],
 ) -> None:
-    """Draw the pictures of a finished run or comparison anew, and a page that shows them."""
+    """Draw pictures and a page of finished results."""
     from orchestrator.report.page import report as make
 
     print(make(directory))
@@ -265,6 +253,8 @@ def report(
 
 def _numbers(text: str | None) -> list[float]:
     """Return the macro steps of ``--macro-steps``."""
+    from orchestrator.coupling.errors import InputError
+
     try:
         return [float(item) for item in _items(text)]
     except ValueError:
@@ -277,10 +267,13 @@ def _items(text: str | None) -> list[str]:
 
 def main(arguments: list[str] | None = None) -> None:
     """Run the command line and end the process with its exit status."""
+    printing.forgive_encodings()
     try:
         app(arguments)
     except SystemExit as end:
         if _left_behind():
+            from orchestrator.coupling.errors import FAILED
+
             # the thread that waits for an FMU which hangs cannot be ended; only the process can
             sys.stdout.flush()
             sys.stderr.flush()

@@ -3,48 +3,42 @@
 from __future__ import annotations
 
 import sys
-from collections.abc import Callable, Iterator, Sequence
+from collections.abc import Callable, Iterable, Iterator, Mapping, Sequence
 from contextlib import contextmanager
+from io import TextIOWrapper
 from typing import TYPE_CHECKING
 
-from fmus.kernels import notice
+import typer
 
 if TYPE_CHECKING:
+    from orchestrator.landing.contract import Finding
+    from orchestrator.landing.modes import CableModes
     from orchestrator.runs.compare import Comparison
     from orchestrator.runs.result import Run
 
+COLOURS = {"ok": "green", "pass": "green", "missing": "red", "wrong": "red", "FAIL": "red", "advice": "yellow"}
+"""First word of a verdict → its colour on a terminal."""
 
-def complain_of(runs: Sequence[Run]) -> None:
-    """Say on stderr what is to be known of `runs`, and what went wrong in them."""
-    for note in dict.fromkeys(note for run in runs for note in run.notes):
-        complain(note)
-    for run in runs:
-        for line in run.warnings:
-            complain(f"{run.label}: {line}")
+
+# -- a run ----------------------------------------------------------------------------------------------------
 
 
 def print_run(run: Run) -> None:
     """Print the extremes of the main signals, the cost, the estimated error and the drift of the energy."""
-    from rich.table import Table
+    from orchestrator.report.signals import extremes, in_the_air
 
-    from orchestrator.report.plots import panels_for
-
-    summary, units = run.summary, run.summary["units"]
+    summary = run.summary
     if summary["exchange_asked"] != summary["exchange"]:
         asked, got = summary["exchange_asked"], summary["exchange"]
         complain(f"cable or robot has no means or slopes for exchange {asked}: {got} in its place")
-    table = Table("signal", "unit", "start", "min", "max", "end", box=None, pad_edge=False)
-    for panel in panels_for(run.table, units=units):
-        values = run.table[panel.signal] * panel.factor
-        numbers = (values[0], values.min(), values.max(), values[-1])
-        table.add_row(panel.signal, panel.unit, *(f"{number:.5g}" for number in numbers))
-    print_table(table)
+    rows = extremes(run.table, run.tolerances, summary["units"])
+    print_table(("signal", "unit", "start", "min", "max", "end"), rows)
     print(
         f"{run.master}, macro step {run.macro_step:g} s: {summary['steps']} steps, "
         f"{summary['iterations_per_step']:.2f} iterations a step, {summary['unconverged_steps']} unconverged, "
         f"{summary['wall_s']:.2f} s"
     )
-    for line in _estimates(run):
+    for line in (*(f"in the air: {line}" for line in in_the_air(run.table)), *_estimates(run)):
         print(line)
     if run.energy is not None:
         print(f"energy drift: {run.energy.drift:.2g} J of {run.energy.exchanged:.3g} J exchanged")
@@ -65,57 +59,92 @@ def _estimates(run: Run) -> Iterator[str]:
         yield f"estimated error of {name}: {error:.1e} ({share:.1e} of its range, allowed {tolerance:g}): {verdict}"
 
 
+# -- a comparison ---------------------------------------------------------------------------------------------
+
+
 def print_comparison(comparison: Comparison) -> None:
-    from rich.table import Table
-
-    from orchestrator.runs.result import verdict_word
-
-    reference = comparison.reference
+    """Print the reference, cost and errors of every run, and the observed orders."""
+    reference, energy = comparison.reference, comparison.reference_energy
     print(f"reference: {reference.kind}, {reference.wall_s:.2f} s")
-    energy = comparison.reference_energy
     if energy is not None:
         print(f"reference's energy drift: {energy.drift:.2g} J of {energy.exchanged:.3g} J exchanged")
         if (warning := energy.warning()) is not None:
             complain(f"reference: {warning}")
-    costs = Table(
-        "master", "H \\[s]", "iterations", "unconverged", "cable steps", "wall \\[s]", box=None, pad_edge=False
-    )
-    for r in comparison.runs:
-        numbers = (
-            f"{r.iterations_per_step:.2f}",
-            f"{r.unconverged_steps}",
-            f"{r.cable_steps}",
-            f"{r.wall_s:.2f}",
-        )
-        costs.add_row(r.master, f"{r.macro_step:g}", *numbers)
-    print_table(costs)
-    checks = Table("master", "H \\[s]", "signal", "relative error", "allowed", "verdict", box=None, pad_edge=False)
-    for c in comparison.checks:
-        word = markup(verdict_word(c.passed, c.note))
-        shown = f"[green]{word}[/]" if c.passed else f"[red]{word}[/]"
-        checks.add_row(c.master, f"{c.macro_step:g}", c.signal, f"{c.error:.2e}", f"{c.tolerance:g}", shown)
-    print_table(checks)
+    print_table(("master", "H [s]", "iterations", "unconverged", "cable steps", "wall [s]"), _costs(comparison))
+    print_table(("master", "H [s]", "signal", "relative error", "allowed", "verdict"), _checks(comparison))
     for master, orders in comparison.observed_order.items():
         shown = ", ".join(f"{name} {orders[name]:.2f}" for name in comparison.tolerance if name in orders)
         print(f"observed order, {master}: {shown}")
 
 
-def print_table(table: object) -> None:
-    """Print a rich table on stdout; a pipe gets every column whole."""
-    from rich.console import Console
+def _costs(comparison: Comparison) -> Iterator[tuple[str, ...]]:
+    for r in comparison.runs:
+        numbers = (f"{r.iterations_per_step:.2f}", f"{r.unconverged_steps}", f"{r.cable_steps}", f"{r.wall_s:.2f}")
+        yield r.master, f"{r.macro_step:g}", *numbers
 
-    Console(width=None if sys.stdout.isatty() else 200, highlight=False).print(table)
+
+def _checks(comparison: Comparison) -> Iterator[tuple[str, ...]]:
+    from orchestrator.runs.result import verdict_word
+
+    for c in comparison.checks:
+        verdict = verdict_word(c.passed, c.note)
+        yield c.master, f"{c.macro_step:g}", c.signal, f"{c.error:.2e}", f"{c.tolerance:g}", verdict
 
 
-def markup(text: str) -> str:
-    from rich.markup import escape
+# -- what there is, what an FMU lacks, modes ------------------------------------------------------------------
 
-    return escape(text)
+
+def print_catalogue(groups: Mapping[str, Mapping[str, str]]) -> None:
+    """Print names with a line each, under the title of their group."""
+    for title, lines in groups.items():
+        print_table((title, ""), ((f"  {name}", line) for name, line in lines.items()))
+
+
+def print_findings(kind: str, findings: Iterable[Finding]) -> None:
+    """Print point by point what was found of a contract."""
+    print_table((f"{kind} contract", "", ""), ((f.what, f.verdict, f.note) for f in findings))
+
+
+def print_modes(found: CableModes) -> None:
+    """Print frequencies and damping ratios."""
+    groups = (found.out_of_plane, found.in_plane)
+    count = max(group.frequency.size for group in groups)
+    rows = [
+        (str(k + 1), *(f"{x[k]:{form}}" if k < x.size else "" for g in groups for x, form in g.columns()))
+        for k in range(count)
+    ]
+    print_table(("mode", "out of plane [Hz]", "damping", "in plane [Hz]", "damping"), rows)
+
+
+# -- tables and lines -----------------------------------------------------------------------------------------
+
+
+def print_table(head: Sequence[str], rows: Iterable[Sequence[str]]) -> None:
+    """Print columns on stdout, each as wide as its widest cell; no line ends in blanks. Verdicts are coloured on a
+    terminal."""
+    lines = [tuple(row) for row in rows]
+    widths = [max(map(len, column)) for column in zip(head, *lines, strict=True)]
+    for i, line in enumerate((head, *lines)):
+        *cells, last = (
+            _styled(cell, bold=i == 0) + " " * (w - len(cell)) for cell, w in zip(line, widths, strict=True)
+        )
+        typer.echo("  ".join([*cells, last.rstrip()]).rstrip())
+
+
+def _styled(cell: str, bold: bool) -> str:
+    colour = COLOURS.get(cell.partition(":")[0])
+    return typer.style(cell, fg=colour, bold=bold or None) if cell and (colour or bold) else cell
 
 
 @contextmanager
 def progress_bars(quiet: bool) -> Iterator[Callable[[str, float, float], None]]:
     """Give what shows a bar for each task, and how far it is."""
+    from fmus.kernels import notice
+
+    notice.muted = quiet
+    if quiet:
+        yield lambda task, time, stop: None
+        return
     from rich.console import Console
     from rich.progress import BarColumn, Progress, TaskID, TextColumn, TimeElapsedColumn, TimeRemainingColumn
 
@@ -124,9 +153,8 @@ def progress_bars(quiet: bool) -> Iterator[Callable[[str, float, float], None]]:
         BarColumn(),
         TextColumn("{task.completed:.2f} of {task.total:g} s"),
     )
-    notice.muted = quiet
-    console, tasks = Console(stderr=True, quiet=quiet), dict[str, TaskID]()
-    with Progress(*columns, TimeElapsedColumn(), TimeRemainingColumn(), console=console, disable=quiet) as bars:
+    tasks = dict[str, TaskID]()
+    with Progress(*columns, TimeElapsedColumn(), TimeRemainingColumn(), console=Console(stderr=True)) as bars:
 
         def show(task: str, time: float, stop: float) -> None:
             if task not in tasks:
@@ -136,5 +164,20 @@ def progress_bars(quiet: bool) -> Iterator[Callable[[str, float, float], None]]:
         yield show
 
 
+def complain_of(runs: Iterable[Run]) -> None:
+    """Say on stderr what went wrong in `runs`."""
+    for run in runs:
+        for line in run.warnings:
+            complain(f"{run.label}: {line}")
+
+
 def complain(message: str) -> None:
+    """Say on stderr what is wrong."""
     print(f"orchestrator: {message}", file=sys.stderr)
+
+
+def forgive_encodings() -> None:
+    """Let what a terminal or a pipe cannot show appear as an escape, not as an error."""
+    for stream in (sys.stdout, sys.stderr):
+        if isinstance(stream, TextIOWrapper):
+            stream.reconfigure(errors="backslashreplace")

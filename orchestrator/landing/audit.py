@@ -19,6 +19,7 @@ from typing import Any
 
 import numpy as np
 
+from fmus.module import registry
 from orchestrator.coupling.run.results import Table
 
 GROUPS = {
@@ -30,12 +31,8 @@ GROUPS = {
     "Work of the control": r"\.control_work$",
 }
 """What a picture shows together."""
-OF_COMPONENT = {
-    "cable": ("kinetic_energy", "strain_energy", "gravitational_energy", "dissipated_energy"),
-    "robot": ("kinetic_energy", "gravitational_energy", "control_work"),
-    "contact": ("strain_energy", "dissipated_energy"),
-}
-"""The signals that the energy of a component is made of."""
+OF_COMPONENT = {entry.contract: entry.energy for entry in registry.MODULES.values() if entry.contract}
+"""The signals that the energy of a component is made of: those of our modules, which foreign FMUs name alike."""
 
 
 @dataclass(frozen=True)

@@ -2,74 +2,129 @@
 
 from __future__ import annotations
 
-from collections.abc import Iterable
+from collections.abc import Iterable, Iterator
 from html import escape
 from pathlib import Path
 from typing import Any
 
+from orchestrator.coupling.errors import InputError, OrchestratorError
 from orchestrator.coupling.run.results import Table, read_json, replacing
+from orchestrator.report.signals import extremes, flight, in_the_air, panels_for
 from orchestrator.runs.compare import Comparison
 from orchestrator.runs.files import read_comparison, read_run, require_finished
 from orchestrator.runs.result import Run, verdict_word
 
 PAGE = """<!doctype html>
-<meta charset="utf-8"><title>{title}</title>
+<html lang="en"><meta charset="utf-8"><title>{title}</title>
 <style>body{{font:15px/1.5 system-ui,sans-serif;max-width:60em;margin:2em auto;padding:0 1em}}
-table{{border-collapse:collapse}}
+table{{border-collapse:collapse;margin:1em 0}}
 th,td{{text-align:left;padding:.2em 1.2em .2em 0;border-bottom:1px solid #ddd}}
 img{{max-width:100%;margin:1em 0}}</style>
 <h1>{title}</h1>
 {body}
+</html>
 """
 
 
-def draw(directory: Path) -> None:
-    """Draw the pictures of a run or a comparison, and of its runs, into ``plots``, from what stands in `directory`."""
-    if not (directory / "comparison.json").is_file():
-        if (directory / "results.csv").is_file():
-            draw_run(directory, read_run(directory))
+def draw(directory: Path) -> list[Path]:
+    """Draw the pictures of a run or a comparison, and of its runs, from what stands in `directory`.
+
+    Returns
+    -------
+    list of Path
+        the pictures, in folders ``plots``; none of a run that ended before its second communication point
+
+    Raises
+    ------
+    InputError : there are no results, or they are damaged
+    """
+    try:
+        return list(_pictures(directory))
+    except OrchestratorError:
+        raise
+    except Exception as error:  # whatever is in a damaged folder: a file of another kind, half a table, a missing key
+        raise InputError(f"{directory}: damaged results ({type(error).__name__}: {error}); run it again") from error
+
+
+def _pictures(directory: Path) -> Iterator[Path]:
+    if (directory / "comparison.json").is_file():
+        comparison = read_comparison(directory)
+        for run in comparison.results:
+            yield from draw_run(directory / run.label, run, comparison.reference.table)
+        yield from draw_comparison(directory, comparison)
         return
-    comparison = read_comparison(directory)
-    for run in comparison.results:
-        draw_run(directory / run.label, run, comparison.reference.table)
-    draw_comparison(directory, comparison)
+    folders = run_folders(directory)
+    if not folders:
+        raise InputError(f"{directory}: no summary.json; there are no results of a run")
+    for folder in folders:
+        yield from draw_run(folder, read_run(folder))
 
 
-def draw_run(directory: Path, run: Run, reference: Table | None = None) -> None:
-    """Draw the pictures of one run into ``plots``."""
+def run_folders(directory: Path) -> list[Path]:
+    """Return the folder of a run itself, or those of the runs of a comparison that was not finished."""
+    if (directory / "summary.json").is_file():
+        return [directory]
+    return sorted(path.parent for path in directory.glob("*/summary.json"))
+
+
+def draw_run(directory: Path, run: Run, reference: Table | None = None) -> Iterator[Path]:
+    """Draw the pictures of one run into ``plots``; yield each when it is there."""
     from orchestrator.report import plots
 
     if len(run.time) < 2:
         return
     folder = directory / "plots"
-    panels = plots.panels_for(run.table, reference, list(run.tolerances), run.summary["units"])
-    plots.overview(folder / "overview.png", run.table, reference, panels)
+    yield _overview(folder, run, reference)
     plots.iterations(folder / "iterations.png", {legend(run): run.iterations})
-    if run.fields and "robot.body.position.z" in run.table:
-        plots.shapes(folder / "shapes.png", run.fields, run.table)
+    yield folder / "iterations.png"
+    yield from _shapes(folder, run)
     if run.energy is not None:
         plots.energy(folder / "energy.png", run.energy)
+        yield folder / "energy.png"
 
 
-def draw_comparison(directory: Path, comparison: Comparison) -> None:
-    """Draw the pictures of all runs together, and the overview of the first."""
-    from orchestrator.report import plots
+def draw_comparison(directory: Path, comparison: Comparison) -> Iterator[Path]:
+    """Draw the pictures of all runs together, and the overview of the first; yield each when it is there."""
+    from orchestrator.report import accuracy, plots
 
     runs = [run for run in comparison.results if len(run.time) > 1]
     if not runs:
         return
-    folder, reference, signals = directory / "plots", comparison.reference.table, list(comparison.tolerance)
-    first = runs[0]
-    panels = plots.panels_for(first.table, reference, signals, first.summary["units"])
-    plots.overview(folder / "overview.png", first.table, reference, panels)
-    plots.errors(folder / "errors.png", {legend(run): run.table for run in runs}, reference, panels)
+    folder, reference, first = directory / "plots", comparison.reference.table, runs[0]
+    yield _overview(folder, first, reference)
+    plots.errors(folder / "errors.png", {legend(run): run.table for run in runs}, reference, _panels(first, reference))
+    yield folder / "errors.png"
     plots.iterations(folder / "iterations.png", {legend(run): run.iterations for run in runs})
-    if first.fields and "robot.body.position.z" in first.table:
-        plots.shapes(folder / "shapes.png", first.fields, first.table)
-    if len({run.macro_step for run in comparison.runs}) > 1 and signals:
-        plots.convergence(folder / "convergence.png", comparison)
-    if len(comparison.runs) > 1 and signals:
-        plots.work_precision(folder / "work_precision.png", comparison)
+    yield folder / "iterations.png"
+    yield from _shapes(folder, first)
+    if len({run.macro_step for run in comparison.runs}) > 1 and comparison.tolerance:
+        accuracy.convergence(folder / "convergence.png", comparison)
+        yield folder / "convergence.png"
+    if len(comparison.runs) > 1 and comparison.tolerance:
+        accuracy.work_precision(folder / "work_precision.png", comparison)
+        yield folder / "work_precision.png"
+
+
+def _overview(folder: Path, run: Run, reference: Table | None) -> Path:
+    from orchestrator.report import plots
+
+    panels = _panels(run, reference)
+    plots.overview(folder / "overview.png", run.table, reference, panels, flight(run.table))
+    return folder / "overview.png"
+
+
+def _panels(run: Run, reference: Table | None) -> list[Any]:
+    """Return the panels of a run; with a reference those of signals that it has as well."""
+    table = run.table if reference is None else {name: x for name, x in run.table.items() if name in reference}
+    return panels_for(table, run.tolerances, run.summary["units"])
+
+
+def _shapes(folder: Path, run: Run) -> Iterator[Path]:
+    from orchestrator.report import plots
+
+    if run.fields and "robot.body.position.z" in run.table:
+        plots.shapes(folder / "shapes.png", run.fields, run.table)
+        yield folder / "shapes.png"
 
 
 def legend(run: Run) -> str:
@@ -77,16 +132,28 @@ def legend(run: Run) -> str:
     return f"{run.master}, {1e3 * run.macro_step:g} ms"
 
 
+# -- the page -------------------------------------------------------------------------------------------------
+
+
 def report(directory: Path) -> Path:
     """Draw the pictures of a finished run or comparison anew and return the page that shows them."""
     require_finished(directory)
     manifest = read_json(directory / "manifest.json")
-    draw(directory)
+    pictures = draw(directory)
+    return _write_page(directory, manifest, list(_tables(directory)), pictures)
+
+
+def _tables(directory: Path) -> Iterator[list[tuple[str, ...]]]:
+    """Yield the tables of a comparison or a run, the head of each first."""
     if (directory / "comparison.json").is_file():
-        rows = _comparison_rows(read_comparison(directory))
-    else:
-        rows = _summary_rows(read_json(directory / "summary.json"))
-    return _write_page(directory, manifest, rows)
+        yield _comparison_rows(read_comparison(directory))
+        return
+    for run in map(read_run, run_folders(directory)):
+        yield _summary_rows(run)
+        yield [
+            ("signal", "unit", "start", "min", "max", "end"),
+            *extremes(run.table, run.tolerances, run.summary["units"]),
+        ]
 
 
 def _comparison_rows(comparison: Comparison) -> list[tuple[str, ...]]:
@@ -104,25 +171,33 @@ def _comparison_rows(comparison: Comparison) -> list[tuple[str, ...]]:
     ]
 
 
-def _summary_rows(summary: dict[str, Any]) -> list[tuple[str, ...]]:
+def _summary_rows(run: Run) -> list[tuple[str, ...]]:
+    summary = run.summary
     shown = ("robot", "stiffness_set", "master", "exchange", "macro_step", "simulated_s", "wall_s")
     shown += ("iterations_per_step", "unconverged_steps", "left_the_groove")
     energy = summary.get("energy") or {}
     rows = [("energy " + name, str(energy[name])) for name in ("drift_J", "exchanged_J", "verdict") if name in energy]
     errors = summary.get("estimated_error", {}).items()
     rows += [(f"estimated error of {name}", "not known" if e is None else f"{e:.2e}") for name, e in errors]
-    return [("what", "value"), *((name, str(summary[name])) for name in shown), *rows]
+    rows += [("in the air", line) for line in in_the_air(run.table)]
+    return [("what", "value"), *((name, str(summary[name])) for name in shown if name in summary), *rows]
 
 
-def _write_page(directory: Path, manifest: dict[str, Any], rows: list[tuple[str, ...]]) -> Path:
-    images = sorted((directory / "plots").glob("*.png"))
+def _write_page(
+    directory: Path, manifest: dict[str, Any], tables: list[list[tuple[str, ...]]], pictures: list[Path]
+) -> Path:
     body = [] if manifest["complete"] else [f"<p><b>Incomplete:</b> {escape(str(manifest['error']))}</p>"]
-    body += [_html_table(rows), *(f'<img src="plots/{i.name}" alt="{i.stem}">' for i in images)]
+    body += [_html_table(rows) for rows in tables]
+    body += [_image(picture.relative_to(directory)) for picture in pictures if picture.is_file()]
     page = directory / "report.html"
     with replacing(page) as temporary:
         title = escape(manifest["resolved"]["title"])
         temporary.write_text(PAGE.format(title=title, body="\n".join(body)), encoding="utf-8")
     return page
+
+
+def _image(place: Path) -> str:
+    return f'<img src="{escape(place.as_posix())}" alt="{escape(place.with_suffix("").as_posix())}">'
 
 
 def _html_table(rows: Iterable[tuple[str, ...]]) -> str:

@@ -39,7 +39,6 @@ class Coupled:
     ----------
     table : signals at the communication points, ``time`` first
     fields : arrays over time as in ``fields.h5``; empty for a general graph
-    units : of the signals, as the FMUs declare them
     fmus : file and SHA-256 of every component
     estimated_error : of the signals with a tolerance, in their units; empty where none was asked for, NaN where it failed
     estimate_failure : why it failed
@@ -50,7 +49,6 @@ class Coupled:
     log: Log
     table: Table
     fields: dict[str, np.ndarray]
-    units: dict[str, str]
     fmus: dict[str, dict[str, str]]
     estimated_error: dict[str, float] = field(default_factory=dict)
     estimate_failure: str = ""
@@ -94,16 +92,10 @@ def run_coupled(system: System | Scenario, progress: Reached = lambda _: None) -
         log = _simulated(system.scenario, graph, progress)
         fmus = {n: {"file": str(f.path), "sha256": f.sha256} for n, f in graph.components.items()}
         exchange = next((fmu.exchange for fmu in graph.components.values() if fmu.exchange), "")
-        units = {signal: _unit(graph, signal) for signal in log.signals}
     if log.error is not None and len(log.time) < 2:
         raise RunError(str(log.error), 0.0)
-    fields, table = system.split({"time": log.time, **dict(zip(log.signals, log.values.T, strict=True))})
-    return Coupled(system, exchange, log, table, fields, {name: units[name] for name in table if name in units}, fmus)
-
-
-def _unit(graph: Graph, signal: str) -> str:
-    component, _, name = signal.partition(".")
-    return graph.components[component].ports[name].unit
+    fields, table = system.split(log.table)
+    return Coupled(system, exchange, log, table, fields, fmus)
 
 
 def _simulated(scenario: Scenario, graph: Graph, progress: Reached) -> Log:

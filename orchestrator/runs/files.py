@@ -21,7 +21,7 @@ from orchestrator.runs.result import Run
 FIELD_UNITS = {"time": "s", "arc_length": "m", "position": "m", "tension": "N"}
 COUNTS = {"iterations": int, "subdivisions": int, "rejected": int, "columns": int, "converged": bool}
 """Columns of ``iterations.csv`` that are no real numbers."""
-Draw = Callable[[Path], None]
+Draw = Callable[[Path], object]
 """Draws the pictures of a run or a comparison into its directory."""
 
 

@@ -30,7 +30,7 @@ class Signal:
     Attributes
     ----------
     name : ``component.variable``
-    unit : as the FMU declares it; empty where it declares none
+    unit : as the FMU declares it; ``1`` where it declares none
     time : (n,) s
     values : (n,), in `unit`
     """

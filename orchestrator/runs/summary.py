@@ -56,7 +56,7 @@ def summary(coupled: Coupled) -> dict[str, Any]:
         "estimated_error": coupled.estimated_error,
         "estimate_failure": coupled.estimate_failure,
         "interface_balance": interface_balance(coupled.table, log.energy),
-        "units": {"time": "s", **coupled.units},
+        "units": {"time": "s"} | {name: log.units[name] for name in coupled.table if name in log.units},
         "extremes": {n: _extremes(log.time, values) for n, values in coupled.table.items() if n != "time"},
     }
 

@@ -7,6 +7,7 @@ from dataclasses import replace
 from pathlib import Path
 from typing import Any, TypeGuard
 
+from fmus.module import registry
 from fmus.module.units import UnitError, convert
 from fmus.module.variables import Variable
 from orchestrator.catalogue import modules as vocabulary
@@ -50,8 +51,8 @@ def _own(kind: str, section: Document) -> dict[str, Variable]:
     model = section.get("model")
     if kind:
         return vocabulary.of_module(kind, model if isinstance(model, str) else None)
-    if isinstance(model, str) and model not in vocabulary.MODELS:
-        raise InputError(f"no model {model!r}{nearest(model, vocabulary.MODELS)}")
+    if isinstance(model, str) and model not in registry.names():
+        raise InputError(f"no model {model!r}{nearest(model, registry.names())}")
     return vocabulary.of_module(model) if isinstance(model, str) else {}
 
 

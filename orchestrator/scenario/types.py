@@ -21,7 +21,7 @@ from pydantic import (
     model_validator,
 )
 
-from orchestrator.catalogue import modules as vocabulary
+from fmus.module import registry
 from orchestrator.catalogue.quantities import Scalar
 from orchestrator.coupling.exchange import Choice
 
@@ -138,7 +138,7 @@ class Component(Section):
     @model_validator(mode="after")
     def _one_source(self) -> Component:
         if (self.model is None) == (self.fmu is None):
-            raise ValueError(f'give either fmu = "FILE.fmu" or model = one of {", ".join(vocabulary.MODELS)}')
+            raise ValueError(f'give either fmu = "FILE.fmu" or model = one of {", ".join(registry.names())}')
         return self
 
 

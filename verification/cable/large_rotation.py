@@ -18,7 +18,7 @@ import matplotlib.pyplot as plt
 import numpy as np
 from scipy.optimize import root_scalar
 
-from orchestrator.report.plots import COLOURS, STYLE
+from orchestrator.report.style import COLOURS, STYLE
 from verification.cable.beam import Beam, cantilever
 from verification.cable.free_beam import FreeBeam
 from verification.study import Result, Row, observed_order

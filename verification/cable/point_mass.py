@@ -23,7 +23,7 @@ import numpy as np
 from scipy.linalg import eigh
 
 from fmus.cable.module import Cable
-from orchestrator.report.plots import BLUE, STYLE, VERMILION
+from orchestrator.report.style import BLUE, STYLE, VERMILION
 from verification.cable.setups import Settings, cable
 from verification.cable.taut import SETTINGS, Taut, taut
 from verification.study import Result, Row

@@ -15,7 +15,7 @@ from pathlib import Path
 import matplotlib.pyplot as plt
 import numpy as np
 
-from orchestrator.report.plots import COLOURS, MARKERS, STYLE
+from orchestrator.report.style import COLOURS, MARKERS, STYLE
 from verification.cable import beam as reference
 from verification.cable.setups import (
     PHYSICAL,

@@ -16,7 +16,7 @@ import numpy as np
 
 from fmus.cable.module import Cable
 from fmus.module.variables import Value
-from orchestrator.report.plots import COLOURS, STYLE
+from orchestrator.report.style import COLOURS, STYLE
 from verification.cable.setups import ROBOT_WEIGHT, TABLE1, Settings, cable, loaded_equilibrium, point
 from verification.cable.taut import SETTINGS as TAUT
 from verification.cable.taut import taut

@@ -17,7 +17,8 @@ import numpy as np
 from scipy.optimize import root_scalar
 
 from orchestrator.landing.modes import CableModes, modes
-from orchestrator.report.modes import draw
+from orchestrator.report.modes import picture
+from orchestrator.runs.modes import shapes
 from verification.cable import beam as reference
 from verification.cable.setups import PHYSICAL, RIG, TABLE1, Settings, beam, cable
 from verification.study import Result, Row, observed_order
@@ -133,5 +134,5 @@ def run(figures: Path) -> Result:
     found += ritz_rows("physical", PHYSICAL, 120, 1e-6) + ritz_rows("rig", RIG, 120, 1e-6)
     found += direct_irvine_rows() + irvine_rows() + beam_rows()
     shown: CableModes = modes(cable(TABLE1, n_elements=40), COUNT)
-    draw(shown, figures / "cable_modes.png")
+    picture(figures / "cable_modes.png", shapes(shown))
     return Result(found, [("cable_modes.png", "Modes of table1 about its equilibrium")])

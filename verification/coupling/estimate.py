@@ -26,7 +26,7 @@ from scipy.linalg import expm
 
 from orchestrator.coupling.run.compare import signal_errors
 from orchestrator.coupling.run.results import Table
-from orchestrator.report.plots import BLUE, COLOURS, GREY, MARKERS, STYLE, VERMILION
+from orchestrator.report.style import BLUE, COLOURS, GREY, MARKERS, STYLE, VERMILION
 from orchestrator.runs.coupled import Coupled, run_coupled
 from orchestrator.runs.estimate import RATIOS, estimate_error
 from orchestrator.runs.result import CONSTANT

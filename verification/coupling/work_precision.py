@@ -12,7 +12,7 @@ from pathlib import Path
 
 import numpy as np
 
-from orchestrator.report.plots import work_precision
+from orchestrator.report.accuracy import work_precision
 from orchestrator.runs.compare import Comparison, held_against
 from orchestrator.runs.coupled import Coupled
 from orchestrator.runs.summary import result

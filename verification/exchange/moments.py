@@ -16,7 +16,7 @@ from numpy.polynomial import Legendre
 from scipy.integrate import solve_ivp
 from scipy.optimize import fsolve
 
-from orchestrator.report.plots import COLOURS, STYLE
+from orchestrator.report.style import COLOURS, STYLE
 from verification.study import Result, Row, observed_order
 
 TITLE = "More moments, damping"

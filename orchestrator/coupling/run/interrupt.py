@@ -3,6 +3,7 @@
 from __future__ import annotations
 
 import signal
+import threading
 from collections.abc import Callable, Iterator
 from contextlib import contextmanager
 from typing import Any
@@ -24,8 +25,11 @@ class Interruption(FmuError):
 def interruptible() -> Iterator[Callable[[float], None]]:
     """Give what a run calls at each communication point; it raises `Interruption` after Ctrl-C.
 
-    A second Ctrl-C ends the program at once.
+    A second Ctrl-C ends the program at once. Only the main thread hears of Ctrl-C; elsewhere the run goes on.
     """
+    if threading.current_thread() is not threading.main_thread():
+        yield lambda time: None
+        return
     asked: list[int] = []
     before = signal.getsignal(signal.SIGINT)
 

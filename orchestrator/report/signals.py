@@ -1,0 +1,224 @@
+"""Which signals people are shown, by which words and in which units, and what counts as nothing.
+
+A number is shown as 0 where it is noise: smaller than `ROUND_OFF` times the largest of its signal, or than the floor of
+its unit. A picometre, a billionth of a newton or of a joule mean nothing to anyone who lands a robot, and arithmetic
+leaves such numbers where the truth is zero. Units without a floor here (those of foreign FMUs) have the first rule alone.
+"""
+
+from __future__ import annotations
+
+import re
+from collections.abc import Iterable, Iterator, Mapping
+from dataclasses import dataclass
+from types import MappingProxyType
+
+import numpy as np
+
+from orchestrator.coupling.run.results import Table
+
+ROUND_OFF = 1e-12
+"""Part of a signal's largest value that says nothing."""
+FLOORS = {"m": 1e-12, "m/s": 1e-12, "rad": 1e-12, "rad/s": 1e-12, "N": 1e-9, "N.m": 1e-9, "J": 1e-9}
+"""Values (in the unit) that say nothing, whatever the signal."""
+DEGREES = 180.0 / np.pi
+MOST_PANELS, MOST_LINES = 6, 6
+"""Panels of a general graph, and lines in one panel."""
+BETWEEN = re.compile(r"_(mean|rate)((?:\.[xyz])?)$")
+"""End of the name of a mean or slope that belongs to another signal, and only serves the coupling."""
+NO_UNITS: Mapping[str, str] = MappingProxyType({})
+
+
+def shown(values: np.ndarray, unit: str) -> np.ndarray:
+    """Return `values` with 0 for those that are noise against the largest of them, or for their unit."""
+    finite = np.abs(values[np.isfinite(values)])
+    floor = max(FLOORS.get(unit, 0.0), ROUND_OFF * float(np.max(finite, initial=0.0)))
+    return np.where(np.abs(values) < floor, 0.0, values)
+
+
+@dataclass(frozen=True)
+class Panel:
+    """Signals of one kind, which share an axis.
+
+    Attributes
+    ----------
+    label : what they are, in words
+    unit : that people read; empty where the FMU declares none
+    lines : signal → what tells it from the others; empty if it is alone
+    factor : from the signals' own unit to `unit`
+    own_unit : of the signals
+    from_start : whether their change since the start is drawn
+    """
+
+    label: str
+    unit: str
+    lines: Mapping[str, str]
+    factor: float = 1.0
+    own_unit: str = ""
+    from_start: bool = False
+
+    @property
+    def axis(self) -> str:
+        """What the axis says: label and unit."""
+        return f"{self.label} [{self.unit}]" if self.unit else self.label
+
+    def values(self, signal: str, table: Table) -> np.ndarray:
+        """Return a signal as it is drawn, in `unit`, noise as 0."""
+        values = shown(table[signal], self.own_unit)
+        return (values - values[0] if self.from_start else values) * self.factor
+
+    def among(self, table: Table) -> Panel:
+        """Return the panel with those lines alone that `table` has as well."""
+        lines = {signal: words for signal, words in self.lines.items() if signal in table}
+        return Panel(self.label, self.unit, lines, self.factor, self.own_unit, self.from_start)
+
+
+@dataclass(frozen=True)
+class _Kind:
+    """A panel of a landing; the group of `pattern` tells its lines apart."""
+
+    label: str
+    pattern: str
+    unit: str
+    factor: float
+    own_unit: str
+    words: str = "{}"
+    from_start: bool = False
+
+
+LANDING = (
+    _Kind("Z displacement", r"robot\.body\.position\.()z", "m", 1.0, "m", from_start=True),
+    _Kind("Angle", r"robot\.(roll|pitch|yaw)", "°", DEGREES, "rad"),
+    _Kind("Contact force", r"contact(\d+)\.normal_force", "N", 1.0, "N", "wheel {}"),
+    _Kind("Cable tension", r"cable\.tension_()mid", "kN", 1e-3, "N"),
+)
+
+
+def panels_for(
+    table: Table, chosen: Iterable[str] = (), units: Mapping[str, str] = NO_UNITS, most: int = MOST_PANELS
+) -> list[Panel]:
+    """Return the panels of a landing; of a general graph those of the `chosen` signals, then of the others.
+
+    Parameters
+    ----------
+    units : of the signals by name, as their FMUs declare them
+    most : panels of a general graph
+    """
+    landing = [panel for kind in LANDING if (panel := _of_kind(kind, table)).lines]
+    return landing or _of_graph([*(n for n in chosen if n in table), *table], units)[:most]
+
+
+def _of_kind(kind: _Kind, table: Table) -> Panel:
+    found = {n: kind.words.format(m[1]) if m[1] else "" for n in table if (m := re.fullmatch(kind.pattern, n))}
+    lines = found if len(found) > 1 else dict.fromkeys(found, "")
+    return Panel(kind.label, kind.unit, lines, kind.factor, kind.own_unit, kind.from_start)
+
+
+def _of_graph(names: Iterable[str], units: Mapping[str, str]) -> list[Panel]:
+    """Return panels of signals that are called alike in several components and have the same unit."""
+    groups: dict[tuple[str, str], dict[str, str]] = {}
+    signals = dict.fromkeys(names)
+    for signal in signals:
+        component, _, variable = signal.partition(".")
+        if variable and not (BETWEEN.search(signal) and BETWEEN.sub(r"\2", signal) in signals):
+            groups.setdefault((variable, units.get(signal, "")), {})[signal] = component
+    return [
+        Panel(variable if len(lines) > 1 else next(iter(lines)), _readable(unit), _few(lines), own_unit=unit)
+        for (variable, unit), lines in groups.items()
+    ]
+
+
+def _few(lines: dict[str, str]) -> dict[str, str]:
+    return dict(list(lines.items())[:MOST_LINES]) if len(lines) > 1 else dict.fromkeys(lines, "")
+
+
+def _readable(unit: str) -> str:
+    return {"1": "–"}.get(unit, unit)
+
+
+def words(signal: str) -> str:
+    """Return what people call `signal`, or its own name."""
+    for kind in LANDING:
+        if match := re.fullmatch(kind.pattern, signal):
+            return kind.words.format(match[1]).capitalize() if match[1] and kind.words == "{}" else kind.label
+    return signal
+
+
+def extremes(
+    table: Table, chosen: Iterable[str] = (), units: Mapping[str, str] = NO_UNITS
+) -> Iterator[tuple[str, ...]]:
+    """Yield a row for each signal of the panels: name, unit, start, least, largest and end, noise as 0."""
+    for panel in panels_for(table, chosen, units):
+        for signal in panel.lines:
+            values = shown(table[signal], panel.own_unit) * panel.factor
+            numbers = (values[0], values.min(), values.max(), values[-1])
+            unit = {"°": "deg", "–": "1"}.get(panel.unit, panel.unit)
+            yield signal, unit, *(f"{number + 0.0:.5g}" for number in numbers)  # + 0.0: no -0
+
+
+# -- in the air -----------------------------------------------------------------------------------------------
+
+
+@dataclass(frozen=True)
+class Flight:
+    """When wheels were off the cable after the first touch, to the macro step.
+
+    Attributes
+    ----------
+    time : (n,) s
+    wheels : contact → (n,) bool, whether it was open
+    airborne : (n,) bool, whether all were, since the first touch
+    """
+
+    time: np.ndarray
+    wheels: Mapping[str, np.ndarray]
+    airborne: np.ndarray
+
+    @property
+    def total(self) -> float:
+        """Time without any contact, s."""
+        return _duration(self.time, self.airborne)
+
+    @property
+    def spans(self) -> list[tuple[float, float]]:
+        """Start and end (s) of each span without any contact; it begins and ends in the middle of a macro step."""
+        edges = np.diff(np.concatenate([[False], self.airborne, [False]]).astype(int))
+        middle = np.concatenate([self.time[:1], 0.5 * (self.time[1:] + self.time[:-1]), self.time[-1:]])
+        return list(zip(middle[edges == 1].tolist(), middle[edges == -1].tolist(), strict=True))
+
+    @property
+    def of_wheels(self) -> dict[str, float]:
+        """Time of each wheel without contact since it first touched, s."""
+        return {name: _duration(self.time, _since_touch(is_open)) for name, is_open in self.wheels.items()}
+
+
+CLOSED = (1.0, 2.0)
+"""Values of a contact's ``status``: sticking, slipping. Open is 0, and 3 a cable that has left the groove."""
+
+
+def flight(table: Table) -> Flight | None:
+    """Return when the robot of a landing was in the air; None where it has no contacts, or has not touched."""
+    names = [m[1] for name in table if (m := re.fullmatch(r"(contact\d+)\.status", name))]
+    wheels = {name: ~np.isin(table[f"{name}.status"], CLOSED) for name in names}
+    if not wheels or all(is_open.all() for is_open in wheels.values()):
+        return None
+    return Flight(table["time"], wheels, _since_touch(np.all(list(wheels.values()), axis=0)))
+
+
+def _since_touch(is_open: np.ndarray) -> np.ndarray:
+    """Return `is_open` (n,) with False before the first touch."""
+    return is_open & (np.cumsum(~is_open) > 0)
+
+
+def _duration(time: np.ndarray, flags: np.ndarray) -> float:
+    """Return for how long `flags` (n,) hold; a macro step in which they change counts half."""
+    return float(np.diff(time) @ (0.5 * (flags[1:].astype(float) + flags[:-1])))
+
+
+def in_the_air(table: Table) -> Iterator[str]:
+    """Yield for how long a robot, and each of several wheels, had no contact since the first touch."""
+    found = flight(table)
+    if found is None:
+        return
+    wheels = found.of_wheels
+    each = ", ".join(f"{name} open {time:.3g} s" for name, time in wheels.items())
+    yield f"{found.total:.3g} s since the first touch" + (f" ({each})" if len(wheels) > 1 else "")
