@@ -1,4 +1,4 @@
-"""What a model description says: variables as ports, capabilities, the unzipped FMU."""
+"""What a model description says: variables as ports, capabilities."""
 
 from __future__ import annotations
 
