@@ -1,4 +1,4 @@
-# make env | run | test | lint | docs | measure | verify | bench
+# make env | run | test | test-wheel | lint | docs | measure | verify | bench
 # The interpreter is the first of PYTHON, python3, python3.13, python3.12, python3.11 that is 3.11 or newer.
 
 SHELL := /bin/bash
@@ -9,7 +9,7 @@ STAMP := $(VENV)/.installed
 
 export OPENBLAS_NUM_THREADS ?= 1
 
-.PHONY: env run test lint docs measure verify bench clean
+.PHONY: env run test test-wheel lint docs measure verify bench clean
 
 env: $(STAMP)
 
@@ -27,10 +27,14 @@ $(STAMP): pyproject.toml
 
 run: env
 	$(BIN)/orchestrator build
-	$(BIN)/orchestrator compare scenarios/landing_200m_point9.toml
+	$(BIN)/orchestrator compare landing_200m_point9
 
 test: env
+	@$(BIN)/python -m fmus.face.first_use
 	$(BIN)/python -m pytest -q
+
+test-wheel: env
+	$(BIN)/python -m pytest -q -m slow tests/test_wheel.py
 
 lint: env
 	$(BIN)/ruff check .
@@ -51,7 +55,7 @@ measure: env
 
 verify: env
 	$(BIN)/python -m verification
-	$(BIN)/python -m pytest -q -m slow || test $$? -eq 5  # 5: no test is marked slow
+	$(BIN)/python -m pytest -q -m slow
 
 bench: env
 	@for file in $(wildcard benchmarks/*.py); do echo "== $$file"; $(BIN)/python "$$file"; done

@@ -1,6 +1,7 @@
 """The kernels of our modules, compiled side by side before they are first used.
 
-    python -m fmus.face.first_use NAME        compiles those of one module
+    python -m fmus.face.first_use             compiles all that are missing, in several processes
+    python -m fmus.face.first_use NAME        compiles those of one module, in this one
 
 Numba compiles in one thread of one process; cable, contact and robot know nothing of each other.
 """
@@ -64,4 +65,7 @@ def compile_module(name: str) -> None:
 
 
 if __name__ == "__main__":
-    compile_module(sys.argv[1])
+    if sys.argv[1:]:
+        compile_module(sys.argv[1])
+    else:
+        compile_modules()
