@@ -9,7 +9,7 @@ STAMP := $(VENV)/.installed
 
 export OPENBLAS_NUM_THREADS ?= 1
 
-.PHONY: env run test lint docs measure verify bench clean
+.PHONY: env run test test-generic test-portable lint docs measure verify bench clean
 
 env: $(STAMP)
 
@@ -31,6 +31,16 @@ run: env
 
 test: env
 	$(BIN)/python -m pytest -q
+
+# what hangs on how a processor rounds, with other kernels than this machine's own; see docs/portability.md
+PORTABLE := $(BIN)/python -m pytest -m 'portable and not slow'
+
+test-generic: env
+	GLIBC_TUNABLES=glibc.cpu.hwcaps=-AVX2,-FMA NUMBA_CPU_NAME=generic $(PORTABLE)
+
+test-portable: test test-generic
+	NUMBA_CPU_NAME=x86-64-v3 NUMBA_CPU_FEATURES= $(PORTABLE)
+	OPENBLAS_CORETYPE=Nehalem OPENBLAS_NUM_THREADS=2 $(PORTABLE)
 
 lint: env
 	$(BIN)/ruff check .
