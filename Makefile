@@ -9,7 +9,7 @@ STAMP := $(VENV)/.installed
 
 export OPENBLAS_NUM_THREADS ?= 1
 
-.PHONY: env run test test-wheel lint docs measure verify bench clean
+.PHONY: env run test test-generic test-portable test-wheel lint docs measure verify bench clean
 
 env: $(STAMP)
 
@@ -35,6 +35,16 @@ test: env
 
 test-wheel: env
 	$(BIN)/python -m pytest -q -m slow tests/test_wheel.py
+
+# what hangs on how a processor rounds, with other kernels than this machine's own; see docs/portability.md
+PORTABLE := $(BIN)/python -m pytest -m 'portable and not slow'
+
+test-generic: env
+	GLIBC_TUNABLES=glibc.cpu.hwcaps=-AVX2,-FMA NUMBA_CPU_NAME=generic $(PORTABLE)
+
+test-portable: test test-generic
+	NUMBA_CPU_NAME=x86-64-v3 NUMBA_CPU_FEATURES= $(PORTABLE)
+	OPENBLAS_CORETYPE=Nehalem OPENBLAS_NUM_THREADS=2 $(PORTABLE)
 
 lint: env
 	$(BIN)/ruff check .

@@ -11,6 +11,8 @@ from verification.cable import point_mass, time_steps
 from verification.cable.setups import TABLE1, cable
 from verification.cable.time_steps import METHODS, SOFT
 
+pytestmark = pytest.mark.portable
+
 LOAD = {"port[1].s": 57.0, "port[1].force.x": 90.0, "port[1].force.z": -372.0, "port[1].moment.x": 20.0}
 
 

@@ -10,6 +10,8 @@ from fmus.cable import element
 from verification.cable.free_beam import FreeBeam
 from verification.cable.large_rotation import order_row, rolled_rows, rows
 
+pytestmark = pytest.mark.portable
+
 EA, EI, DAMPING, LENGTH = 2.0e6, 400.0, 0.004, 1.3
 SEEDS = st.integers(0, 2**32 - 1)
 

@@ -13,6 +13,8 @@ from verification.cable.setups import PHYSICAL, RIG, TABLE1, cable
 from verification.cable.taut import SETTINGS as TAUT
 from verification.cable.taut import taut
 
+pytestmark = pytest.mark.portable
+
 
 @pytest.mark.parametrize(("name", "settings"), [("table1", TABLE1), ("physical", PHYSICAL), ("rig", RIG)])
 def test_against_rayleigh_ritz(name, settings):

@@ -12,6 +12,8 @@ from verification.cable import statics
 from verification.cable.setups import PHYSICAL, RIG, TABLE1, cable, loaded_equilibrium, point, support_forces
 from verification.cable.statics import CONVERGED, RECOMMENDED, Case
 
+pytestmark = pytest.mark.portable
+
 CASES = [
     Case("table1"),
     Case("table1", clamped=True, load_at=0.5),

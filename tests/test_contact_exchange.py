@@ -15,6 +15,8 @@ from fmus.contact.path import motion_at, waveform_path
 from fmus.contact.sampling import gauss_rule, sample_law
 from fmus.module.variables import ModuleError
 
+pytestmark = pytest.mark.portable
+
 HALF = math.radians(50.0)
 SIN = math.sin(HALF)
 SEAT = 0.075 - 0.04 / math.tan(HALF) + 0.009 / SIN  # radial distance of first touch

@@ -14,6 +14,8 @@ from fmus.contact import places as at
 from fmus.contact.law import LEFT, NODES, OPEN, SLIP, STICK, contact_wrench, law_parameters
 from fmus.contact.module import Contact
 
+pytestmark = pytest.mark.portable
+
 HALF = math.radians(50.0)
 SIN, COS = math.sin(HALF), math.cos(HALF)
 APEX = 0.075 - 0.04 / math.tan(HALF)

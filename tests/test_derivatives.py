@@ -23,7 +23,7 @@ from orchestrator.coupling.stepping.interpolation import Between, Loads
 from orchestrator.coupling.stepping.jacobian import OwnDerivatives
 from tests.fmus import MILD, compiled, described, needs_compiler, oscillator, started
 
-pytestmark = needs_compiler
+pytestmark = [needs_compiler, pytest.mark.portable]
 
 NONE, OVER_STEP, AT_INSTANT, WRONG, NOT_A_NUMBER, DISCARD, ERROR, FATAL = 0, 1, 2, 3, 4, 12, 13, 14
 A = np.array([[-3.0, 1.0, 0.5], [1.0, -4.0, 1.0], [0.2, 1.0, -2.0]])

@@ -30,6 +30,8 @@ from tests.fmus import fmu
 from tests.scenarios import LANDING, OSCILLATOR, exact_oscillator
 from tests.systems import ITERATED, run
 
+pytestmark = pytest.mark.portable
+
 RECORD = ["a.position", "a.velocity", "b.position", "b.velocity"]
 
 

@@ -20,6 +20,8 @@ from orchestrator.coupling.run.log import Log
 from orchestrator.coupling.run.simulate import simulate
 from tests.fmus import chain, chain_solution, fmu
 
+pytestmark = pytest.mark.portable
+
 WAVEFORM, HERMITE, POINT = 0.0, 1.0, 2.0
 OMEGA_H = [0.1, 1.0, 3.0, 3.3, 3.6, 10.0, 100.0, 1000.0]
 H = 0.01

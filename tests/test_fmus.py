@@ -10,6 +10,8 @@ from fmus.face.build import build_fmu
 from fmus.module import registry
 from tests.fmi import Instance
 
+pytestmark = pytest.mark.portable
+
 STARTS = {
     "cable": {"port[1].force.z": -50.0, "port[1].s": 80.0},
     "contact": {"wheel.position.z": 0.06},  # in touch

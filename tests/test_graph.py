@@ -12,6 +12,8 @@ from orchestrator.coupling.masters import MASTERS
 from orchestrator.coupling.run.simulate import simulate
 from tests.fmus import MILD, compiled, fmu, needs_compiler, oscillator
 
+pytestmark = pytest.mark.portable
+
 REFUSED = [
     ("a.y", "c.u", "no component 'c'"),
     ("a.yy", "b.u", "no variable 'yy'; did you mean y"),

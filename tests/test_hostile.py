@@ -161,6 +161,7 @@ def test_a_diverging_run_is_written_to_its_end(orchestrate, tmp_path):
     assert (tmp_path / "out" / "manifest.json").is_file()
 
 
+@pytest.mark.portable
 def test_a_robot_by_other_means_in_the_landing():
     """Same robot, own integrator, no units, means or slopes, outputs known only after the initialisation.
 

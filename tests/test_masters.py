@@ -18,6 +18,8 @@ from orchestrator.coupling.run.simulate import simulate
 from tests.fmus import MILD, STIFF, chain, chain_solution, fmu, oscillator, oscillator_solution
 from tests.systems import IMPLICIT, ITERATED, POINT, POSITIONS, closing, faulty_oscillator, run
 
+pytestmark = pytest.mark.portable
+
 
 def error(master: str, H: float, system: dict, waveform: bool = False, stop: float = 2.0, **options) -> float:
     """Return the largest error of both positions at the communication points, m."""

@@ -15,6 +15,8 @@ from fmus.module.variables import ModuleError
 from fmus.robot import rigid_body
 from fmus.robot.module import Robot, body_parameters, initial_state, robot_table
 
+pytestmark = pytest.mark.portable
+
 EPS = np.finfo(float).eps
 GENERAL = {
     "mass": 7.0,

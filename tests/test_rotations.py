@@ -8,6 +8,8 @@ from scipy.spatial.transform import Rotation
 
 from fmus.kernels import rotations
 
+pytestmark = pytest.mark.portable
+
 ROUND_OFF = 1e-14
 components = st.floats(-1.0, 1.0, allow_subnormal=False)
 vectors = st.tuples(components, components, components).map(np.array)

@@ -20,6 +20,8 @@ from tests.fmus import MILD, oscillator, oscillator_solution
 from tests.scenarios import DROP
 from tests.systems import IMPLICIT, POSITIONS, faulty_oscillator, run
 
+pytestmark = pytest.mark.portable
+
 
 def controlled(master: str, tolerance: float):
     """The oscillator, its whole motion of 2 s in two macro steps."""

@@ -25,6 +25,8 @@ from tests.fmus import MILD, compiled, described, fmu, needs_compiler, oscillato
 from tests.scenarios import OSCILLATOR
 from tests.systems import IMPLICIT, ITERATED, POINT, POSITIONS, faulty_oscillator, run
 
+pytestmark = pytest.mark.portable
+
 VARIES = 'canHandleVariableCommunicationStepSize="true"'
 
 

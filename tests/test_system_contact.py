@@ -13,6 +13,8 @@ from orchestrator.runs.coupled import run_coupled
 from orchestrator.scenario.read import load
 from tests.scenarios import LANDING, scenario
 
+pytestmark = pytest.mark.portable
+
 FREE = {"robot.parameters.wheel[1].braked": "false"}
 PUSH = {"robot.parameters.initial.velocity.x": 2.0, "landing.height": 0.02}
 

@@ -15,6 +15,8 @@ from orchestrator.runs.coupled import run_coupled
 from orchestrator.runs.summary import summary
 from tests.scenarios import scenario
 
+pytestmark = pytest.mark.portable
+
 
 @pytest.fixture(scope="module")
 def flagship():

@@ -14,6 +14,8 @@ from orchestrator.landing import build as landing
 from orchestrator.landing.monolithic.solve import integrate, solve
 from tests.scenarios import scenario
 
+pytestmark = pytest.mark.portable
+
 
 class Independent:
     """The same physics as one explicit system of differential equations, y' = f(t, y).

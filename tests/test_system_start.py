@@ -11,6 +11,8 @@ from orchestrator.landing.monolithic.solve import integrate, solve
 from orchestrator.runs.components import opened
 from tests.scenarios import scenario
 
+pytestmark = pytest.mark.portable
+
 STOP, STEP = 0.1, 0.005
 Z, FORCE = "robot.body.position.z", "contact1.normal_force"
 WEIGHT = 38.0 * 9.8

@@ -12,6 +12,8 @@ from orchestrator.landing.monolithic.solve import Integrator, integrate
 from orchestrator.runs.coupled import run_coupled
 from tests.scenarios import scenario
 
+pytestmark = pytest.mark.portable
+
 ROUND_OFF = 1e-10
 """m and rad, over 1 s."""
 ITERATION = 1e-7
