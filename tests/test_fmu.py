@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+import os
 import shutil
 import subprocess
 import sys
@@ -12,9 +13,9 @@ import numpy as np
 import pytest
 
 from orchestrator.coupling.exchange import suffixed
-from orchestrator.coupling.fmu.description import unzip_folder
 from orchestrator.coupling.fmu.failure import NOT_FINITE, TIMEOUT, FmuError
 from orchestrator.coupling.fmu.instance import Fmu
+from orchestrator.coupling.fmu.unzipped import unzip, unzip_folder
 from orchestrator.coupling.graph.graph import Graph
 from orchestrator.coupling.graph.links import Connection
 from orchestrator.coupling.masters import MASTERS
@@ -137,6 +138,34 @@ def test_awkward_path(tmp_path):
     assert str(unzip_folder(instance.sha256)).isascii()
     assert instance.sha256 == fmu("odd", "same").sha256
     instance.close()
+
+
+def test_where_no_folder_of_the_users_has_a_plain_path_another_serves(tmp_path, monkeypatch):
+    monkeypatch.delenv("LINE_LANDING_CACHE", raising=False)
+    monkeypatch.setenv("XDG_CACHE_HOME", str(tmp_path / "Höhle"))
+    monkeypatch.setattr("tempfile.tempdir", str(tmp_path / "vorübergehend"))
+    assert unzip_folder("0").parts[1] in ("tmp", "var") and not list(tmp_path.iterdir())
+
+
+def test_a_link_that_anybody_can_have_put_there_is_no_folder_of_the_users(tmp_path, monkeypatch):
+    monkeypatch.setenv("LINE_LANDING_CACHE", str(tmp_path / "Höhle"))
+    monkeypatch.setattr("tempfile.tempdir", str(tmp_path))
+    (tmp_path / "other").mkdir()
+    (tmp_path / f"line-landing-{os.getuid()}").symlink_to(tmp_path / "other")
+    assert tmp_path not in unzip_folder("0").parents
+
+
+def test_unzipped_fmus_that_nobody_uses_are_removed(tmp_path, monkeypatch):
+    monkeypatch.setenv("LINE_LANDING_CACHE", str(tmp_path))
+    for kind in ("fmu", "unzipped"):
+        old, new = tmp_path / kind / "old", tmp_path / kind / "new"
+        (old / "resources").mkdir(parents=True)
+        new.mkdir()
+        os.utime(old, (0, 0))
+    path = build("odd")
+    folder = unzip(path, "0123")
+    assert (folder / "modelDescription.xml").is_file() and folder.parent == tmp_path / "unzipped"
+    assert sorted(place.name for place in tmp_path.glob("*/*")) == ["0123", "new", "new"]
 
 
 def test_messages_are_collected_with_their_percent_signs():

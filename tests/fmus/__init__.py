@@ -34,9 +34,13 @@ def _folder() -> Path:
     return Path(holder.name)
 
 
-@cache
 def build(name: str, *, rollback: bool = True) -> Path:
     """Build ``NAME_fmu.py`` of this folder, once a process (``wave`` from ``link``); return the FMU."""
+    return _built(name, rollback)
+
+
+@cache
+def _built(name: str, rollback: bool) -> Path:
     folder = _folder() / ("" if rollback else "no_rollback")
     folder.mkdir(exist_ok=True)
     script = SCRIPTS / f"{name}_fmu.py"

@@ -2,11 +2,7 @@
 
 from __future__ import annotations
 
-import contextlib
 import hashlib
-import os
-import re
-import tempfile
 import zipfile
 from dataclasses import dataclass
 from functools import lru_cache
@@ -65,30 +61,6 @@ class Capabilities:
     variable_step: bool
     directional_derivatives: bool
     internal_step: float | None = None
-
-
-def unzip_folder(sha256: str) -> Path:
-    """Return a plain ASCII folder for the FMU of this hash: loaders choke on others, and compiled code is
-    found again."""
-    for base in (Path.home() / ".cache", Path(tempfile.gettempdir())):
-        folder = base / "line-landing" / "fmu" / sha256[:16]
-        if re.fullmatch(r"[A-Za-z0-9_./\\:-]+", str(folder)):
-            with contextlib.suppress(OSError):
-                folder.parent.mkdir(parents=True, exist_ok=True)
-                if os.access(folder.parent, os.W_OK):
-                    return folder
-    raise OSError("no folder with a plain ASCII path can be written; set TMPDIR to one")
-
-
-def unzip(path: Path, sha256: str) -> Path:
-    """Unzip the FMU once; return the folder."""
-    folder = unzip_folder(sha256)
-    if not (folder / "modelDescription.xml").is_file():
-        with tempfile.TemporaryDirectory(dir=folder.parent) as scratch:
-            fmpy.extract(str(path), os.path.join(scratch, "fmu"))
-            with contextlib.suppress(OSError):  # another process was faster
-                os.rename(os.path.join(scratch, "fmu"), folder)
-    return folder
 
 
 def element_names(variable: ModelVariable) -> list[str]:

@@ -30,9 +30,10 @@ from orchestrator.coupling.fmu.binding import (
     SavedState,
     finalize_python,
 )
-from orchestrator.coupling.fmu.description import Port, Value, capabilities_of, ports_of, read_description, unzip
+from orchestrator.coupling.fmu.description import Port, Value, capabilities_of, ports_of, read_description
 from orchestrator.coupling.fmu.failure import NOT_FINITE, FmuError
 from orchestrator.coupling.fmu.group import Group
+from orchestrator.coupling.fmu.unzipped import unzip
 
 logging.getLogger("fmus").addHandler(logging.NullHandler())  # what our FMUs say comes through FMI, like that of others
 
