@@ -47,9 +47,7 @@ _PARAMETERS = [
         kind="integer",
         bounds=Bounds(ge=1, le=5000),
     ),
-    parameter(
-        "grading", "1", 1.0, "ratio of the longest to the shortest element; 1: equal elements", Bounds(ge=1.0)
-    ),
+    parameter("grading", "1", 1.0, "ratio of the longest to the shortest element; 1: equal elements", Bounds(ge=1.0)),
     parameter(
         "grading_position",
         "m",

@@ -90,29 +90,18 @@ def ports_of(variable: ModelVariable) -> list[Port]:
 
 
 def sha256_of(path: Path) -> str:
-    """Return the SHA-256 of a file as hexadecimal digits; each state of a file is read once."""
-    return _sha256(path, *_state(path))
+    """Return the SHA-256 of a file as hexadecimal digits."""
+    return hashlib.sha256(path.read_bytes()).hexdigest()
 
 
 def parsed(path: Path) -> ModelDescription:
-    """Return FMPy's model description of the file as it now is; each state of a file is read once."""
-    return _parsed(path, *_state(path))
-
-
-def _state(path: Path) -> tuple[int, int]:
-    """Return what changes with the content of a file: the time it was written, ns, and its size."""
-    status = path.stat()
-    return status.st_mtime_ns, status.st_size
+    """Return FMPy's model description of an FMU; the same content is parsed once, whenever it was written."""
+    return _parsed(path, sha256_of(path))
 
 
 @lru_cache(maxsize=32)
-def _parsed(path: Path, *state: int) -> ModelDescription:
+def _parsed(path: Path, sha256: str) -> ModelDescription:
     return fmpy.read_model_description(str(path), validate=False)
-
-
-@lru_cache(maxsize=32)
-def _sha256(path: Path, *state: int) -> str:
-    return hashlib.sha256(path.read_bytes()).hexdigest()
 
 
 def read_description(path: Path) -> tuple[ModelDescription, str]:
@@ -121,7 +110,7 @@ def read_description(path: Path) -> tuple[ModelDescription, str]:
         raise ValueError(f"{path}: no such file; build the FMUs, or correct the path")
     sha256 = sha256_of(path)
     try:
-        description = parsed(path)
+        description = _parsed(path, sha256)
     except Exception as error:
         raise ValueError(f"{path}: not an FMU ({error})") from error
     if description.coSimulation is None:
