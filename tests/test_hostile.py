@@ -132,7 +132,7 @@ def test_a_damaged_archive_is_refused(loop, orchestrate, tmp_path, cut):
     [
         ("master.max_iterations=0", "master.max_iterations: 0 must be greater than 0"),
         ("master.tolerance=-1.0", "master.tolerance: -1.0 must be greater than 0"),
-        ("master.max_depth=-1", "master.max_depth: -1 must not be negative"),
+        ("master.max_depth=-1", "master.max_depth: -1 must be at least 0"),
         ("simulation.tolerances.q.z=1e-3", "simulation.tolerances.q.z: no such signal; did you mean q.y?"),
         ("components.q.parameters.y=1.0", "is no parameter; its causality is output"),
     ],

@@ -154,9 +154,9 @@ LAYOUTS = {
     "within a function": ("def f():\n    from layout import callee\n    return callee\n", {"callee"}),
     "package below": ("from layout.below import inner\n", {"below.inner", "callee"}),
     "name of a package below": ("from layout.below import DEPTH\n", {"below", "constants"}),
-    "circle": ("from layout import circle\n", {"circle"}),
+    "circle": ("from layout import circle\n", {"circle", ""}),  # which imports layout.main, and so the package
     "library": ("import numpy as np\nimport numba.core.types\nimport os.path\nfrom math import pi\n", set()),
-    "no module": ("import no_such_module\nfrom layout.nowhere import x\n", {""}),
+    "no module": ("import no_such_module\nfrom layout.nowhere import x\n", set()),
 }
 """How one file imports others → the modules that it depends on; the empty name is the package's own file."""
 
