@@ -52,7 +52,7 @@ def _own(kind: str, section: Document) -> dict[str, Variable]:
     """Return the variables of our own module: a landing's `kind`, or a component's `model`."""
     model = section.get("model")
     if kind:
-        return vocabulary.of_module(kind, model if isinstance(model, str) else None)
+        return vocabulary.of_module(kind, model if kind == "robot" and isinstance(model, str) else None)
     if isinstance(model, str) and model not in registry.names():
         raise InputError(f"no model {model!r}{nearest(model, registry.names())}")
     return vocabulary.of_module(model) if isinstance(model, str) else {}
