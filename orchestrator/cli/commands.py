@@ -24,6 +24,7 @@ class Commands(TyperGroup):
 
     def invoke(self, ctx: Any) -> Any:
         """Carry out one command."""
+        warnings.simplefilter("once")  # a scenario may be read for every master and step
         warnings.showwarning = lambda message, *_: printing.complain(str(message))
         try:
             return super().invoke(ctx)
