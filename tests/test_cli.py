@@ -13,6 +13,8 @@ import pytest
 
 from fmus.robot.module import robot_table
 from orchestrator.catalogue import modules as vocabulary
+from orchestrator.catalogue.library import module_fmu, robot_fmu
+from orchestrator.catalogue.robot_spec import catalogue, load_robot
 from orchestrator.coupling.masters import MASTERS
 from orchestrator.coupling.masters.options import master_options
 from orchestrator.coupling.run.results import read_fields, read_table
@@ -23,6 +25,11 @@ from tests.fmus import build
 from tests.scenarios import LANDING, OSCILLATOR, ROOT, exact_oscillator
 
 COMMAND = [sys.executable, "-m", "orchestrator"]
+
+
+def shipped_fmu(name: str) -> Path:
+    """Return the FMU of one of our modules, or of a robot of the catalogue."""
+    return robot_fmu(load_robot(name)) if name in catalogue() else module_fmu(name)
 
 
 def orchestrate(*arguments: object, timeout: float = 300.0) -> subprocess.CompletedProcess[str]:
@@ -254,7 +261,7 @@ def test_a_robot_is_swapped_with_as_many_contacts_as_wheels(tmp_path: Path):
 
 
 def test_a_foreign_robot_gives_the_same_as_the_same_one_of_the_catalogue(landing_run, tmp_path: Path):
-    robot = shutil.copy(ROOT / "fmu" / "fptlir.fmu", tmp_path / "mine.fmu")
+    robot = shutil.copy(shipped_fmu("fptlir"), tmp_path / "mine.fmu")
     out = tmp_path / "out"
     done = orchestrate("run", LANDING, "--robot", robot, "--out", out, "--stop", 0.05)
     assert done.returncode == 0, done.stderr
@@ -263,18 +270,18 @@ def test_a_foreign_robot_gives_the_same_as_the_same_one_of_the_catalogue(landing
 
 
 def test_an_fmu_that_is_no_robot_is_refused_by_name(landing_run):
-    done = orchestrate("validate", LANDING, "--robot", ROOT / "fmu" / "contact.fmu")
+    done = orchestrate("validate", LANDING, "--robot", shipped_fmu("contact"))
     assert done.returncode == 2 and "body.position" in done.stderr and "orchestrator check" in done.stderr
 
 
 @pytest.mark.parametrize(("name", "kind"), [("fptlir", "robot"), ("cable", "cable"), ("contact", "contact")])
 def test_check_finds_the_contract_of_our_fmus(landing_run, name: str, kind: str):
-    done = orchestrate("check", ROOT / "fmu" / f"{name}.fmu")
+    done = orchestrate("check", shipped_fmu(name))
     assert done.returncode == 0 and f"meets the {kind} contract" in done.stdout
 
 
 def test_check_says_what_a_wrong_fmu_lacks(landing_run):
-    done = orchestrate("check", ROOT / "fmu" / "contact.fmu", "--contract", "robot")
+    done = orchestrate("check", shipped_fmu("contact"), "--contract", "robot")
     assert done.returncode == 1 and "does not meet the robot contract" in done.stdout and "missing" in done.stdout
 
 

@@ -83,8 +83,9 @@ def test_replay_is_bit_identical(path, folder):
 
 def test_outputs_after_a_restore_do_not_depend_on_what_came_before(path, folder):
     start = STARTS[path.stem]
-    load = {name: value * 1.001 for name, value in start.items()}
     with Instance(folder, **start) as one, Instance(folder, **start) as other:
+        inputs = [name for name in start if one.variables[name].causality == "input"]
+        load = {name: start[name] * 1.001 for name in inputs}
         one.initialize()
         other.initialize()
         at_start = one.fmu.getFMUstate()
