@@ -68,7 +68,9 @@ verify: env
 	$(BIN)/python -m pytest -q -m slow
 
 bench: env
-	@for file in $(wildcard benchmarks/*.py); do echo "== $$file"; $(BIN)/python "$$file"; done
+	@for name in $(notdir $(basename $(wildcard benchmarks/*.py))); do \
+	  echo "== $$name"; $(BIN)/python -m benchmarks.$$name || exit 1; \
+	done
 
 clean:
 	rm -rf $(VENV) build dist

@@ -18,7 +18,7 @@ import pytest
 from fmpy.fmi1 import FMICallException
 from fmpy.validation import validate_fmu
 
-from fmus.face.build import build_fmu, ensure_all, ensure_fmu, is_stale, plain, rename_imports
+from fmus.face.build import Target, build_fmu, ensure_all, ensure_fmu, plain, record, rename_imports
 from fmus.module.recipe import FmuRecipe
 from fmus.module.units import unit
 from fmus.module.variables import ModuleError
@@ -276,6 +276,10 @@ def test_same_input_same_bytes(path, tmp_path):
 def test_only_what_is_stale_is_built(path):
     before = path.stat().st_mtime_ns
     assert ensure_fmu(RECIPE, path.parent).stat().st_mtime_ns == before
+
+    def is_stale(place, recipe):
+        return not Target(recipe, place, record(recipe)).is_there
+
     assert not is_stale(path, RECIPE)
     assert is_stale(path, dataclasses.replace(RECIPE, start={"damping": 0.4}))
     assert is_stale(path.with_name("missing.fmu"), RECIPE)

@@ -120,11 +120,6 @@ def ensure_all(targets: Iterable[Target]) -> list[Path]:
     return [target.path for target in targets]
 
 
-def is_stale(path: Path, recipe: FmuRecipe) -> bool:
-    """Say whether the FMU at `path` is missing, damaged or made from other sources or another recipe."""
-    return not Target(recipe, path, record(recipe)).is_there
-
-
 def record(recipe: FmuRecipe) -> dict[str, Any]:
     """Return what decides over the content of an FMU."""
     return {

@@ -36,28 +36,29 @@ def draw(directory: Path) -> list[Path]:
 
     Raises
     ------
-    InputError : there are no results, or they are damaged
+    InputError : there are no results
     """
-    try:
-        return list(_pictures(directory))
-    except OrchestratorError:
-        raise
-    except Exception as error:  # whatever is in a damaged folder: a file of another kind, half a table, a missing key
-        raise InputError(f"{directory}: damaged results ({type(error).__name__}: {error}); run it again") from error
+    return list(_pictures(directory, _results(directory)))
 
 
-def _pictures(directory: Path) -> Iterator[Path]:
+def _results(directory: Path) -> Comparison | list[Run]:
+    """Return the comparison in `directory`, or the run, or those of a comparison that was not finished."""
     if (directory / "comparison.json").is_file():
-        comparison = read_comparison(directory)
-        for run in comparison.results:
-            yield from draw_run(directory / run.label, run, comparison.reference.table)
-        yield from draw_comparison(directory, comparison)
-        return
+        return read_comparison(directory)
     folders = run_folders(directory)
     if not folders:
         raise InputError(f"{directory}: no summary.json; there are no results of a run")
-    for folder in folders:
-        yield from draw_run(folder, read_run(folder))
+    return [read_run(folder) for folder in folders]
+
+
+def _pictures(directory: Path, results: Comparison | list[Run]) -> Iterator[Path]:
+    if isinstance(results, Comparison):
+        for run in results.results:
+            yield from draw_run(directory / run.label, run, results.reference.table)
+        yield from draw_comparison(directory, results)
+        return
+    for folder, run in zip(run_folders(directory), results, strict=True):
+        yield from draw_run(folder, run)
 
 
 def run_folders(directory: Path) -> list[Path]:
@@ -136,19 +137,29 @@ def legend(run: Run) -> str:
 
 
 def report(directory: Path) -> Path:
-    """Draw the pictures of a finished run or comparison anew and return the page that shows them."""
+    """Draw the pictures of a finished run or comparison anew and return the page that shows them.
+
+    Raises
+    ------
+    InputError : there are no results, or they are damaged
+    """
     require_finished(directory)
-    manifest = read_json(directory / "manifest.json")
-    pictures = draw(directory)
-    return _write_page(directory, manifest, list(_tables(directory)), pictures)
+    try:
+        results, manifest = _results(directory), read_json(directory / "manifest.json")
+        pictures = list(_pictures(directory, results))
+        return _write_page(directory, manifest, list(_tables(results)), pictures)
+    except Exception as error:  # whatever is in a damaged folder: a file of another kind, half a table, a missing key
+        if isinstance(error, OrchestratorError) or (isinstance(error, OSError) and error.errno):
+            raise  # said already; or the system's word, a full disk for instance
+        raise InputError(f"{directory}: damaged results ({type(error).__name__}: {error}); run it again") from error
 
 
-def _tables(directory: Path) -> Iterator[list[tuple[str, ...]]]:
-    """Yield the tables of a comparison or a run, the head of each first."""
-    if (directory / "comparison.json").is_file():
-        yield _comparison_rows(read_comparison(directory))
+def _tables(results: Comparison | list[Run]) -> Iterator[list[tuple[str, ...]]]:
+    """Yield the tables of a comparison or of runs, the head of each first."""
+    if isinstance(results, Comparison):
+        yield _comparison_rows(results)
         return
-    for run in map(read_run, run_folders(directory)):
+    for run in results:
         yield _summary_rows(run)
         yield [
             ("signal", "unit", "start", "min", "max", "end"),

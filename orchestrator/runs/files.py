@@ -80,8 +80,7 @@ def _drawn(directory: RunDirectory, draw: Draw) -> str | None:
     try:
         draw(directory.path)
     except Exception as error:  # whatever it is: the numbers are there, and worth more
-        cause = error.__cause__ or error  # the results just written are not damaged, whatever a report says of them
-        return f"{type(cause).__name__}: {cause}"
+        return f"{type(error).__name__}: {error}"
     return None
 
 

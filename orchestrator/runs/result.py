@@ -151,7 +151,7 @@ class Run:
         """What was decided in reading the scenario that its author may not expect, a line each."""
         return self.summary["notes"]
 
-    @property
+    @cached_property
     def energy(self) -> audit.Audit | None:
         """The energy audit; None where a component does not show its energy."""
         return audit.of_coupled(self.table, self.tolerances.values())
