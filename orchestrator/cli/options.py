@@ -60,7 +60,9 @@ Out = Annotated[
 ]
 Robot = Annotated[
     str | None,
-    typer.Option(metavar="NAME|FILE", help="Another robot in the scenario's place.", autocompletion=robots),
+    typer.Option(
+        metavar="NAME|FILE.toml|FILE.fmu", help="Another robot in the scenario's place.", autocompletion=robots
+    ),
 ]
 Master = Annotated[str | None, typer.Option(help="Another master, see `orchestrator list`.", autocompletion=masters)]
 Masters = Annotated[str | None, typer.Option(metavar="A,B,…", help="Masters to compare.", autocompletion=masters)]

@@ -138,7 +138,7 @@ def errors(path: Path, runs: Mapping[str, Table], reference: Table, panels: Sequ
     ----------
     runs : tables by the label that the legend shows
     """
-    with saved(path, (6.4, 1.7 * len(panels) + 0.9)) as figure:
+    with saved(path, (6.4, 1.7 * len(panels) + 0.5 + 0.06 * len(runs))) as figure:
         axes = figure.subplots(len(panels), 1, sharex=True, squeeze=False)[:, 0]
         for axis, panel in zip(axes, panels, strict=True):
             for i, (label, run) in enumerate(runs.items()):
@@ -159,7 +159,7 @@ def errors(path: Path, runs: Mapping[str, Table], reference: Table, panels: Sequ
 
 def iterations(path: Path, tables: Mapping[str, Table]) -> Figure:
     """Draw the iterations of a macro step, mean and (of few runs) range; crosses are unconverged steps."""
-    with saved(path, (6.4, 2.6 + 0.12 * len(tables))) as figure:
+    with saved(path, (6.4, 2.6 + 0.06 * len(tables))) as figure:
         axis = figure.subplots()
         for i, (label, table) in enumerate(tables.items()):
             _iterations_of(axis, table, i, len(tables), label)
