@@ -17,6 +17,7 @@ from typer.core import TyperGroup
 
 import orchestrator
 from orchestrator.cli import new, options, printing
+from orchestrator.cli.start import importing
 
 
 class Commands(TyperGroup):
@@ -108,8 +109,9 @@ def validate(scenario: options.Scenario, robot: options.Robot = None, set_: opti
 
     Parsed and loaded, with connections, units and contracts.
     """
-    from orchestrator.api import load_scenario
-    from orchestrator.runs.components import master_of, opened
+    with importing():
+        from orchestrator.api import load_scenario
+        from orchestrator.runs.components import master_of, opened
 
     loaded = load_scenario(scenario, set=set_, robot=robot)
     with opened(loaded) as graph:
@@ -149,8 +151,11 @@ def run(
     quiet: options.Quiet = False,
 ) -> None:
     """Run a scenario coupled."""
+    with importing():
+        from orchestrator import api
+
     with printing.progress_bars(quiet) as progress:
-        done = orchestrator.run(
+        done = api.run(
             scenario,
             set=set_,
             robot=robot,
@@ -184,11 +189,12 @@ def compare(
     quiet: options.Quiet = False,
 ) -> None:
     """Run coupled and monolithic, and say the error of the coupling."""
-    from orchestrator.api import Unfinished
+    with importing():
+        from orchestrator import api
 
     try:
         with printing.progress_bars(quiet) as progress:
-            done = orchestrator.compare(
+            done = api.compare(
                 scenario,
                 masters=_items(masters),
                 macro_steps=_numbers(macro_steps),
@@ -202,7 +208,7 @@ def compare(
                 progress=progress,
                 pictures=not no_pictures,
             )
-    except Unfinished as error:
+    except api.Unfinished as error:
         printing.complain_of(error.runs)
         print(f"results so far in {error.directory}")
         raise
@@ -224,11 +230,12 @@ def modes(
 
     With damping ratios and shapes, about its static equilibrium.
     """
-    from orchestrator.api import load_scenario
-    from orchestrator.landing.modes import of_scenario
-    from orchestrator.report.modes import draw
-    from orchestrator.runs.directory import claimed
-    from orchestrator.runs.modes import write_modes
+    with importing():
+        from orchestrator.api import load_scenario
+        from orchestrator.landing.modes import of_scenario
+        from orchestrator.report.modes import draw
+        from orchestrator.runs.directory import claimed
+        from orchestrator.runs.modes import write_modes
 
     loaded = load_scenario(scenario, set=set_)
     if out is None:
@@ -247,7 +254,8 @@ def report(
     directory: Annotated[Path, typer.Argument(metavar="DIR", help="Directory of a finished run.")],
 ) -> None:
     """Draw pictures and a page of finished results."""
-    from orchestrator.report.page import report as make
+    with importing():
+        from orchestrator.report.page import report as make
 
     print(make(directory))
 
