@@ -38,7 +38,6 @@ from orchestrator.runs.files import (
     write_run,
     write_unfinished,
 )
-from orchestrator.runs.reference import solve_reference
 from orchestrator.runs.result import Run, Signal, run_label
 from orchestrator.runs.summary import result
 from orchestrator.runs.systems import System, resolve
@@ -242,6 +241,8 @@ def _variants(
 def _compared(
     system: System, variants: Sequence[Scenario], progress: Progress, directory: RunDirectory | None
 ) -> Comparison:
+    from orchestrator.runs.reference import solve_reference  # with the kernels of the monolithic solver
+
     runs: list[Run] = []
     steps = sorted({variant.simulation.macro_step for variant in variants})
     try:

@@ -2,12 +2,16 @@
 
 from __future__ import annotations
 
+from typing import TYPE_CHECKING
+
 from fmus.cable.module import Cable
 from fmus.module.variables import VariableTable
 from fmus.robot.module import Robot
-from orchestrator.landing.monolithic import Problem
 from orchestrator.landing.resolve import Landing, Variables, cable_module, contact_module, resolve, robot_module
 from orchestrator.scenario.types import LandingScenario
+
+if TYPE_CHECKING:
+    from orchestrator.landing.monolithic import Problem
 
 NOT_NEEDED = ("initial.", ".braked", ".inertia", ".axle_direction", "integration_step", "n_wheels", "center_of_mass")
 """Robot parameters that a reference takes at their defaults where a foreign robot does not have them."""
@@ -15,6 +19,8 @@ NOT_NEEDED = ("initial.", ".braked", ".inertia", ".axle_direction", "integration
 
 def problem(landing: Landing | LandingScenario) -> Problem:
     """Return new initialised modules for the monolithic solver; a scenario is resolved first."""
+    from orchestrator.landing.monolithic import Problem
+
     if not isinstance(landing, Landing):
         landing = resolve(landing)
     cable, robot = cable_module(landing.cable), robot_module(landing.robot, landing.n_wheels)

@@ -5,7 +5,7 @@ from __future__ import annotations
 from collections.abc import Callable, Iterable, Mapping
 from dataclasses import dataclass, replace
 from pathlib import Path
-from typing import Any, Protocol, TypeVar
+from typing import TYPE_CHECKING, Any, Protocol, TypeVar
 
 import numpy as np
 
@@ -21,11 +21,13 @@ from orchestrator.coupling.run.results import Table
 from orchestrator.landing import audit
 from orchestrator.landing.build import has_monolithic, problem
 from orchestrator.landing.fields import cable_fields
-from orchestrator.landing.monolithic import Problem
 from orchestrator.landing.resolve import Landing, Variables
 from orchestrator.landing.resolve import resolve as resolve_landing
 from orchestrator.landing.wiring import landing_graph
 from orchestrator.scenario.types import CableSection, Component, GraphScenario, LandingScenario, RobotSection, Scenario
+
+if TYPE_CHECKING:
+    from orchestrator.landing.monolithic import Problem
 
 INNER_STEP = "integration_step"
 Fields = dict[str, np.ndarray]
