@@ -5,8 +5,6 @@ from __future__ import annotations
 from collections.abc import Iterable, Mapping, Sequence
 
 import numpy as np
-from scipy.sparse import csr_array
-from scipy.sparse.csgraph import connected_components
 
 from orchestrator.coupling.fmu.instance import Fmu
 from orchestrator.coupling.graph.links import Link, Signal
@@ -35,11 +33,25 @@ def dependencies_of(components: Mapping[str, Fmu], *, initial: bool) -> Dependen
 def _components_of(edges: Iterable[tuple[int, int]], n: int) -> np.ndarray:
     """Return the number of the strongly connected component of each of `n` vertices, sources before what
     they feed."""
-    pairs = np.array(sorted(set(edges)), dtype=np.intp).reshape(-1, 2)
-    matrix = csr_array((np.ones(len(pairs)), (pairs[:, 0], pairs[:, 1])), shape=(n, n))
-    _, labels = connected_components(matrix, directed=True, connection="strong")
-    ranks = _longest_paths([(labels[a], labels[b]) for a, b in pairs if labels[a] != labels[b]], int(labels.max()) + 1)
+    pairs = set(edges)
+    labels = _strongly_connected(pairs, n)
+    ranks = _longest_paths([(labels[a], labels[b]) for a, b in pairs if labels[a] != labels[b]], max(labels) + 1)
     return np.array([ranks[label] * (n + 1) + label for label in labels])
+
+
+def _strongly_connected(edges: Iterable[tuple[int, int]], n: int) -> list[int]:
+    """Return for each of `n` vertices the number of its strongly connected component; they count by their first vertex.
+
+    Two vertices are in the same one if each can be reached from the other: squaring the matrix of what is reached doubles
+    the length of the paths.
+    """
+    reached = np.eye(n, dtype=np.float32)
+    for a, b in edges:
+        reached[a, b] = 1.0
+    for _ in range(n.bit_length()):
+        reached = np.minimum(reached @ reached, 1.0)
+    first = np.argmax(np.minimum(reached, reached.T), axis=1)
+    return np.unique(first, return_inverse=True)[1].tolist()
 
 
 def _longest_paths(edges: Sequence[tuple[int, int]], n: int) -> list[int]:

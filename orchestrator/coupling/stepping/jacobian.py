@@ -5,7 +5,6 @@ from __future__ import annotations
 from collections.abc import Callable
 
 import numpy as np
-from scipy.linalg import expm
 
 from orchestrator.coupling.exchange import vectors
 from orchestrator.coupling.fmu.derivatives import Partials, states
@@ -76,6 +75,8 @@ class OwnDerivatives:
         matrix = self.partials()
         if matrix is None:
             return []
+        from scipy.linalg import expm  # few FMUs come to here, and the import takes as long as a short run
+
         held, ends = self._inputs_of(H)
         C, D = matrix[: self.n_y, self.n_u :], matrix[: self.n_y, : self.n_u]
         A, B = matrix[self.n_y :, self.n_u :], matrix[self.n_y :, : self.n_u]
