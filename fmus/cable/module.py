@@ -3,13 +3,13 @@
 from __future__ import annotations
 
 import numpy as np
-from scipy.optimize import root_scalar
 
 from fmus.cable import dynamics, ports
 from fmus.cable.assembly import Model, interpolate
 from fmus.cable.diagnosis import diagnose
 from fmus.cable.state import N_PORTS, NOT_FINITE, OFF_CABLE, OK, factorise_mass, make_work, state_size
 from fmus.cable.statics import equilibrium, mesh_model
+from fmus.kernels.roots import root
 from fmus.kernels.time_integration import collocation, generalized_alpha
 from fmus.module.variables import (
     NON_NEGATIVE,
@@ -208,7 +208,7 @@ class Cable:
         parabola = chord * (1.0 + 4.0 * (self["sag"] / chord) ** 2) + self["sag"] * 0.01
         longest = min(parabola, chord + 2.1 * self["sag"])
         try:
-            return float(root_scalar(excess, bracket=(0.99 * chord, longest), xtol=1e-12 * chord).root)
+            return root(excess, 0.99 * chord, longest, xtol=1e-12 * chord)
         except ValueError:
             raise ModuleError(
                 f"cable: sag: {self['sag']:g} m cannot be reached; "

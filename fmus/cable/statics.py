@@ -3,7 +3,6 @@
 from __future__ import annotations
 
 import numpy as np
-from scipy.optimize import root_scalar
 
 from fmus.cable.assembly import (
     HALF_BANDWIDTH,
@@ -16,6 +15,7 @@ from fmus.cable.assembly import (
 )
 from fmus.cable.mesh import nodes
 from fmus.kernels import banded
+from fmus.kernels.roots import root
 from fmus.module.variables import ModuleError
 
 MAX_ITERATIONS = 300
@@ -88,15 +88,14 @@ def _horizontal_tension(model: Model, span: float, level_difference: float, high
         low *= 0.1
         if low < 1e-15 * w * length:
             return None
-    return float(root_scalar(excess, bracket=(low, high), rtol=1e-14).root)
+    return root(excess, low, high, rtol=1e-14)
 
 
 def _vertical_tension(model: Model, h: float, level_difference: float) -> float:
     """Return the vertical tension at the left end with which the catenary ends at the level of the right support."""
     w, length = model.density * model.gravity, model.s[-1]
     bound = 1e3 * (w * length + h)
-    found = root_scalar(lambda v: _drop(h, v, w, length, model.ea) - level_difference, bracket=(-bound, bound))
-    return float(found.root)
+    return root(lambda v: _drop(h, v, w, length, model.ea) - level_difference, -bound, bound)
 
 
 def _reach(h: float, v: float, w: float, s: float, ea: float) -> float:
