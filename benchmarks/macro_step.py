@@ -1,66 +1,92 @@
-"""Where the microseconds of a macro step go: the landing 20 m from the tower, `interface_jacobian`, 5 s.
+"""Where the microseconds of a macro step go: the landing 20 m from the tower, `interface_jacobian`.
 
-    python -m benchmarks.macro_step [MACRO_STEP [MASTER]]
+    python -m benchmarks.macro_step [MACRO_STEP [MASTER [STOP]]]
 
-A clock around every call to an FMU (about 0.3 µs a call itself, booked with the call). What is left is the master: least
-squares, linear models, prediction, residuals, books, records.
+Plain runs and runs with a clock (of CPU time, about 0.6 µs a call, booked with the call) around every call to an FMU take
+turns. What is left is the master: least squares, linear models, prediction, residuals, books, records.
 """
 
 from __future__ import annotations
 
 import sys
 from collections import defaultdict
-from collections.abc import Callable
+from collections.abc import Callable, Iterator
+from contextlib import contextmanager
 from pathlib import Path
-from time import perf_counter
+from time import process_time
 from typing import Any
 
+import numpy as np
+
+from benchmarks.clock import Loop, ratio, turns
 from orchestrator.coupling.fmu.group import Group
 from orchestrator.coupling.fmu.instance import Fmu
 from orchestrator.runs.coupled import run_coupled
+from orchestrator.runs.systems import System, resolve
 from orchestrator.scenario.read import load
 
 SCENARIO = Path(__file__).parents[1] / "scenarios" / "landing_200m_point9.toml"
 CALLS = {Group: ("set", "get", "get_finite"), Fmu: ("step", "save", "restore", "release")}
-SPENT: defaultdict[tuple[str, str], list[float]] = defaultdict(lambda: [0.0, 0.0])
+ROUNDS = 3
+Spent = defaultdict[tuple[str, str], list[float]]
 """Component and call → seconds, number."""
 
 
-def clocked(function: Callable[..., Any], call: str) -> Callable[..., Any]:
+def clocked(function: Callable[..., Any], call: str, booked: Spent) -> Callable[..., Any]:
     """Return `function`, a method of `Fmu` or `Group`, with a clock around it."""
 
     def timed(self: Fmu | Group, *arguments: Any) -> Any:
-        start = perf_counter()
+        start = process_time()
         try:
             return function(self, *arguments)
         finally:
-            entry = SPENT[self.fmu.name if isinstance(self, Group) else self.name, call]
-            entry[0] += perf_counter() - start
+            entry = booked[self.fmu.name if isinstance(self, Group) else self.name, call]
+            entry[0] += process_time() - start
             entry[1] += 1
 
     return timed
 
 
-def main() -> None:
-    """Run once to warm up, once plain and once with the clocks; print the table."""
-    step = float(sys.argv[1]) if len(sys.argv) > 1 else 0.005
-    master = sys.argv[2] if len(sys.argv) > 2 else "interface_jacobian"
-    scenario = load(SCENARIO).changed(stop_time=5.0, macro_step=step, master=master)
-    run_coupled(scenario)
-    plain = run_coupled(scenario).log
-    for kind, calls in CALLS.items():
-        for call in calls:
-            setattr(kind, call, clocked(getattr(kind, call), call.removesuffix("_finite")))
-    SPENT.clear()
-    log = run_coupled(scenario).log
-    n, unit = len(log.steps), 1e6 / len(log.steps)
-    print(f"{master}, {1e3 * step:g} ms: {plain.wall * unit:.0f} µs a macro step ({log.wall * unit:.0f} with clocks), ")
+@contextmanager
+def clocks(booked: Spent) -> Iterator[None]:
+    """Put clocks around the calls, and take them away again."""
+    plain = {(kind, call): getattr(kind, call) for kind, calls in CALLS.items() for call in calls}
+    for (kind, call), function in plain.items():
+        setattr(kind, call, clocked(function, call.removesuffix("_finite"), booked))
+    try:
+        yield
+    finally:
+        for (kind, call), function in plain.items():
+            setattr(kind, call, function)
+
+
+def run(system: System, booked: Spent | None = None) -> float:
+    """Run coupled, with clocks that book into `booked`; return the CPU time of the loop, s."""
+    loop = Loop()
+    if booked is None:
+        run_coupled(system, loop)
+        return loop.spent()
+    with clocks(booked):
+        run_coupled(system, loop)
+        return loop.spent()
+
+
+def main(step: float = 0.005, master: str = "interface_jacobian", stop: float = 5.0) -> None:
+    """Print the table."""
+    system = resolve(load(SCENARIO).changed(stop_time=stop, macro_step=step, master=master))
+    booked: Spent = defaultdict(lambda: [0.0, 0.0])
+    times = turns({"plain": lambda: run(system), "clocked": lambda: run(system, booked)}, ROUNDS)
+    n = ROUNDS * round(stop / step)
+    plain, whole = (1e6 * np.median(times[name]) / (n / ROUNDS) for name in ("plain", "clocked"))
+    print(f"{master}, {1e3 * step:g} ms: {plain:.0f} µs of CPU a macro step", end=" ")
+    print(f"({whole:.0f} with clocks, a ratio of {ratio(times, 'clocked', 'plain'):.2f})")
     print("| component | call | µs a macro step | calls | µs a call |\n|---|---|---|---|---|")
-    for (name, call), (spent, number) in sorted(SPENT.items(), key=lambda item: -item[1][0]):
-        print(f"| {name} | {call} | {spent * unit:.0f} | {number / n:.1f} | {1e6 * spent / number:.1f} |")
-    rest = log.wall - sum(spent for spent, _ in SPENT.values())
-    print(f"| master | all else | {rest * unit:.0f} | | |")
+    for (name, call), (seconds, number) in sorted(booked.items(), key=lambda item: -item[1][0]):
+        print(f"| {name} | {call} | {1e6 * seconds / n:.0f} | {number / n:.1f} | {1e6 * seconds / number:.1f} |")
+    inside = 1e6 * sum(seconds for seconds, _ in booked.values()) / n
+    print(f"| master | all else | {whole - inside:.0f} | | |")
+    print(f"the master beside the FMUs: {(whole - inside) / inside:.2f}")
 
 
 if __name__ == "__main__":
-    main()
+    main(*(kind(text) for kind, text in zip((float, str, float), sys.argv[1:], strict=False)))

@@ -1,25 +1,25 @@
 """What a master costs beside the FMUs: two trivial FMUs in C, Jacobi, against a bare FMPy loop and libcosim.
 
-    python -m benchmarks.master_overhead [STEPS]
+    python -m benchmarks.master_overhead [STEPS [ROUNDS]]
 
-p' = q, q' = -p by two FMUs of a line each (FMI 2.0, compiled here); both states are recorded. All contestants take
-turns, and the best round of each counts. Printed, in µs a macro step: the whole loop, the time inside doStep, and what
-is left; for our Jacobi also what the set and get calls of that rest take when they are made alone. libcosim takes part
-if `libcosimpy` can be imported: once called from Python for every step, and once in its own loop in C++.
+p' = q, q' = -p by two FMUs of a line each (FMI 2.0, compiled here); both states are recorded. All contestants take turns.
+Printed, in µs of CPU time a macro step: the whole loop (median), and by the bare loop over FMPy's lists (median of the
+ratios within a round); also what the steps of the FMUs, and the calls that set and get, take when they are made alone.
+libcosim takes part if `libcosimpy` can be imported: called from Python for every step, and in its own loop in C++.
 """
 
 from __future__ import annotations
 
 import sys
 from collections.abc import Callable
-from functools import cache
+from functools import cache, partial
 from importlib import import_module
-from time import perf_counter
 
 import numpy as np
 from fmpy import extract, read_model_description
 from fmpy.fmi2 import FMU2Slave
 
+from benchmarks.clock import Loop, ratio, spent, turns
 from orchestrator.coupling.fmu.instance import Fmu
 from orchestrator.coupling.graph.graph import Graph
 from orchestrator.coupling.graph.links import Connection
@@ -29,9 +29,8 @@ from tests.fmus import compiled
 
 H = 1e-3
 PARAMETERS = {"p": {"start": 1.0, "gain": 1.0}, "q": {"start": 0.0, "gain": -1.0}}
-ROUNDS = 10
-Times = tuple[float, float | None]
-"""Whole and inside doStep (None where it cannot be seen), µs a macro step."""
+PEER = "bare loop, FMPy"
+OURS = ("jacobi", "gauss_seidel", "iqn_ils", "interface_jacobian")
 
 
 def graph() -> Graph:
@@ -43,33 +42,36 @@ def graph() -> Graph:
     return Graph(parts, [Connection("p.y", "q.u"), Connection("q.y", "p.u")])
 
 
-def ours(master: str, steps: int) -> Times:
+def ours(master: str, steps: int) -> float:
     """Run one of our masters."""
-    system = graph()
-    log = simulate(system, MASTERS[master](system), 0.0, (steps + 1) * H, H, ["p.y", "q.y"])
+    system, loop = graph(), Loop()
+    log = simulate(system, MASTERS[master](system), 0.0, (steps + 1) * H, H, ["p.y", "q.y"], loop)
+    cost = loop.spent()
     system.close()
     assert log.error is None
-    return log.wall / steps * 1e6, sum(log.wall_components.values()) / steps * 1e6
+    return cost
 
 
-def calls(steps: int) -> Times:
+def repeated(call: Callable[[], object], steps: int) -> float:
+    """Return the CPU time of `steps` calls, s."""
+
+    def loop() -> None:
+        for _ in range(steps):
+            call()
+
+    return spent(loop)
+
+
+def calls(steps: int) -> float:
     """Make the set and get calls of one step alone: 2 set, 4 get as in `ours`."""
     system = graph()
     system.initialize(0.0)
     recorded = [Fmu.group(node.fmu, ["y"]) for node in system.nodes]
     made = [node.inputs.runs[0].set_call for node in system.nodes]
     made += [group.runs[0].get_call for group in [*(node.outputs for node in system.nodes), *recorded]]
-    wall = timed(lambda: [call() for call in made], steps)
+    cost = repeated(lambda: [call() for call in made], steps)
     system.close()
-    return wall, None
-
-
-def timed(function: Callable[[], object], steps: int) -> float:
-    """Return the time of one call, µs."""
-    clock = perf_counter()
-    for _ in range(steps):
-        function()
-    return (perf_counter() - clock) / steps * 1e6
+    return cost
 
 
 @cache
@@ -90,25 +92,32 @@ def slaves() -> tuple[list[FMU2Slave], dict[str, int]]:
     return made, references
 
 
-def bare_fmpy(steps: int) -> Times:
+def steps_alone(steps: int) -> float:
+    """Make the two steps of a macro step alone, through FMPy."""
+    (a, b), _ = slaves()
+    return repeated(lambda: (a.doStep(0.0, H), b.doStep(0.0, H)), steps)
+
+
+def bare_fmpy(steps: int) -> float:
     """Run the same exchange written with FMPy's lists."""
     (a, b), references = slaves()
-    u, y, t, rows, inside = [references["u"]], [references["y"]], 0.0, [], 0.0
-    clock = perf_counter()
-    for _ in range(steps):
-        start = perf_counter()
-        a.doStep(t, H)
-        b.doStep(t, H)
-        inside += perf_counter() - start
-        t += H
-        p, q = a.getReal(y), b.getReal(y)
-        a.setReal(u, q)
-        b.setReal(u, p)
-        rows.append((p[0], q[0]))
-    return (perf_counter() - clock) / steps * 1e6, inside / steps * 1e6
+    u, y, t, rows = [references["u"]], [references["y"]], 0.0, []
+
+    def loop() -> None:
+        nonlocal t
+        for _ in range(steps):
+            a.doStep(t, H)
+            b.doStep(t, H)
+            t += H
+            p, q = a.getReal(y), b.getReal(y)
+            a.setReal(u, q)
+            b.setReal(u, p)
+            rows.append((p[0], q[0]))
+
+    return spent(loop)
 
 
-def libcosim(steps: int, *, own_loop: bool) -> Times:
+def libcosim(steps: int, *, own_loop: bool) -> float:
     """Run libcosim's fixed-step algorithm (Jacobi), a time-series observer on both states."""
     api = {name: getattr(import_module(f"libcosimpy.{name}"), name) for name in ("CosimExecution", "CosimObserver")}
     slave_of = import_module("libcosimpy.CosimSlave").CosimLocalSlave
@@ -129,44 +138,34 @@ def libcosim(steps: int, *, own_loop: bool) -> Times:
     for place in places:
         observer.start_time_series(place, y, kinds.REAL)
     execution.step(1)
-    clock = perf_counter()
-    for _ in range(1 if own_loop else steps):
-        execution.step(steps if own_loop else 1)
-    wall = (perf_counter() - clock) / steps * 1e6
+    cost = spent(lambda: execution.step(steps)) if own_loop else repeated(lambda: execution.step(1), steps)
     _, _, values = observer.time_series_real_samples(p, y, 1, steps)
     assert np.isfinite(values[-1])
-    return wall, None
+    return cost
 
 
-def contestants() -> dict[str, Callable[[int], Times]]:
+def contestants(steps: int) -> dict[str, Callable[[], float]]:
     """Return who takes part."""
-    found: dict[str, Callable[[int], Times]] = {"jacobi": lambda n: ours("jacobi", n), "set, get alone": calls}
-    for master in ("gauss_seidel", "iqn_ils", "interface_jacobian"):
-        found[master] = lambda n, master=master: ours(master, n)
-    found["bare loop, FMPy"] = bare_fmpy
+    found: dict[str, Callable[[], float]] = {PEER: partial(bare_fmpy, steps)}
+    found |= {master: partial(ours, master, steps) for master in OURS}
+    found |= {"steps alone, FMPy": partial(steps_alone, steps), "set, get alone": partial(calls, steps)}
     try:
         logging = import_module("libcosimpy.CosimLogging")
         logging.log_output_level(logging.CosimLogLevel.WARNING)
-        found["libcosim, step by step"] = lambda n: libcosim(n, own_loop=False)
-        found["libcosim, its own loop"] = lambda n: libcosim(n, own_loop=True)
+        found["libcosim, step by step"] = partial(libcosim, steps, own_loop=False)
+        found["libcosim, its own loop"] = partial(libcosim, steps, own_loop=True)
     except ImportError:
         print("libcosimpy is not installed: libcosim does not take part")
     return found
 
 
-def main() -> None:
+def main(steps: int = 5000, rounds: int = 10) -> None:
     """Print the table."""
-    steps = int(sys.argv[1]) if len(sys.argv) > 1 else 5000
-    found = contestants()
-    best: dict[str, Times] = {}
-    for _ in range(ROUNDS):
-        for name, run in found.items():
-            best[name] = min(best.get(name, (np.inf, None)), run(steps), key=lambda times: times[0])
-    print(f"{'':24}{'whole':>8}{'doStep':>8}{'rest':>8}   µs a macro step")
-    for name, (whole, inside) in best.items():
-        share = "" if inside is None else f"{inside:8.1f}{whole - inside:8.1f}"
-        print(f"{name:24}{whole:8.1f}{share}")
+    times = turns(contestants(steps), rounds)
+    print(f"{'':24}{'µs of CPU a macro step':>24}{'by the bare loop':>20}")
+    for name, values in times.items():
+        print(f"{name:24}{1e6 * np.median(values) / steps:24.1f}{ratio(times, name, PEER):20.2f}")
 
 
 if __name__ == "__main__":
-    main()
+    main(*map(int, sys.argv[1:]))

@@ -1,26 +1,31 @@
-"""Time of one Newton iteration of a cable of 20 elements: residual, and solution with a kept factorisation.
+"""CPU time of one Newton iteration of a cable of 20 elements: residual, and solution with a kept factorisation.
 
-Generalized-alpha has one real stage, collocation two stages and one complex solution. Prints microseconds, each the
-least of several repetitions.
+    python -m benchmarks.newton_iteration [ROUNDS]
+
+Generalized-alpha has one real stage, collocation two stages and one complex solution. All take turns; printed are µs
+(medians), and what collocation costs by generalized-alpha (median of the ratios within a round).
 """
 
 from __future__ import annotations
 
+import sys
 from collections.abc import Callable
-from time import perf_counter
+from functools import partial
 
 import numpy as np
 
-from fmus.cable.assembly import Model, constrain_vector, iteration_matrix, residual
+from benchmarks.clock import ratio, spent, turns
+from fmus.cable.assembly import constrain_vector, iteration_matrix, residual
 from fmus.cable.module import Cable
-from fmus.cable.state import Work, make_work
+from fmus.cable.state import make_work
 from fmus.kernels import banded
 from fmus.kernels.jit import kernel
 from fmus.module.variables import Value
 
-REPEAT, NUMBER = 20, 500
+NUMBER = 500
 TARGET = 15.0
 """Microseconds of a real iteration that are aimed at."""
+INTEGRATORS = ("collocation", "generalized_alpha")
 
 
 @kernel
@@ -40,18 +45,8 @@ def solutions(band, x, number):
         banded.solve(band, x)
 
 
-def microseconds(call: Callable[[], object]) -> float:
-    """Return the least time of `call`, which repeats what is measured NUMBER times, for one of them."""
-    call()
-    times = []
-    for _ in range(REPEAT):
-        start = perf_counter()
-        call()
-        times.append(perf_counter() - start)
-    return 1e6 * min(times) / NUMBER
-
-
-def main() -> None:
+def contestants() -> dict[str, Callable[[], object]]:
+    """Return what is measured; each call does it NUMBER times."""
     cable = Cable()
     cable.initialize(0.0)
     model, work = cable.model, make_work(cable.model.weight.size, cable.state.size)
@@ -62,41 +57,60 @@ def main() -> None:
     iteration_matrix(model, q, v, 1.0 + 0.0j, z, z * z, work.band, work.matrix, work.element)
     banded.factorise(work.real_band)
     banded.factorise(work.band)
-    stage = microseconds(lambda: residuals(model, q, v, work, NUMBER))
-    real = microseconds(lambda: solutions(work.real_band, work.increment, NUMBER))
-    both = microseconds(lambda: solutions(work.band, work.mode, NUMBER))
-    print(f"residual of a stage          {stage:6.2f} µs")
-    print(f"solution, real / complex     {real:6.2f} / {both:.2f} µs")
-    print(f"iteration, generalized-alpha {stage + real:6.2f} µs (aim: {TARGET:g} µs)")
-    print(f"iteration, collocation       {2 * stage + both:6.2f} µs (two stages)")
-    print(f"iteration matrix, real       {_matrix_time(model, q, v, work):6.2f} µs, made anew once a macro step")
-    for integrator in ("collocation", "generalized_alpha"):
-        print(f"macro step of 5 ms, 2 inner  {_macro_step_time(integrator):6.1f} µs ({integrator}, all outputs)")
+    real, other = work.real_band.copy(), work.real_band.copy()
 
-
-def _matrix_time(model: Model, q: np.ndarray, v: np.ndarray, work: Work) -> float:
-    """Return the time to assemble and factorise the real iteration matrix, µs."""
-
-    def make() -> None:
+    def matrices() -> None:
         for _ in range(NUMBER):
-            iteration_matrix(model, q, v, 1.0, 1e-3, 1e-6, work.real_band, work.real_matrix, work.element)
-            banded.factorise(work.real_band)
+            iteration_matrix(model, q, v, 1.0, 1e-3, 1e-6, other, work.real_matrix, work.element)
+            banded.factorise(other)
 
-    return microseconds(make)
+    return {
+        "residual of a stage": lambda: residuals(model, q, v, work, NUMBER),
+        "solution, real": lambda: solutions(real, work.increment, NUMBER),
+        "solution, complex": lambda: solutions(work.band, work.mode, NUMBER),
+        "iteration matrix, real": matrices,
+        **{f"macro step, {name}": Swing(name) for name in INTEGRATORS},
+    }
 
 
-def _macro_step_time(integrator: str) -> float:
-    """Return the mean time of a macro step of a cable that swings, µs; called from Python."""
-    cable = Cable()
-    settings: dict[str, Value] = {"integrator": integrator, "port[1].s": 60.0, "port[1].force.z": -372.0}
-    cable.table.assign(cable.values, settings)
-    cable.initialize(0.0)
-    cable.step(0.0, 0.005)
-    start = perf_counter()
-    for k in range(1, NUMBER + 1):
-        cable.step(0.005 * k, 0.005)
-    return 1e6 * (perf_counter() - start) / NUMBER
+class Swing:
+    """A cable that swings; a call makes NUMBER macro steps of 5 ms with two inner steps and all outputs, from Python."""
+
+    def __init__(self, integrator: str):
+        self.cable, self.k = Cable(), 0
+        settings: dict[str, Value] = {"integrator": integrator, "port[1].s": 60.0, "port[1].force.z": -372.0}
+        self.cable.table.assign(self.cable.values, settings)
+        self.cable.initialize(0.0)
+
+    def __call__(self) -> None:
+        for _ in range(NUMBER):
+            self.cable.step(0.005 * self.k, 0.005)
+            self.k += 1
+
+
+def main(rounds: int = 20) -> None:
+    """Print the table."""
+    made = contestants()
+    for call in made.values():
+        call()  # compiles
+    times = {name: 1e6 * values / NUMBER for name, values in turns(_clocked(made), rounds).items()}
+    stage = times["residual of a stage"]
+    times["iteration, generalized-alpha"] = stage + times["solution, real"]
+    times["iteration, collocation"] = 2.0 * stage + times["solution, complex"]
+    for name, values in times.items():
+        print(f"{name:32}{np.median(values):8.2f} µs")
+    print(f"aim of an iteration, generalized-alpha: {TARGET:g} µs")
+    print(f"collocation by generalized-alpha: an iteration {_by(times, 'iteration, collocation')}", end=", ")
+    print(f"a macro step {ratio(times, *(f'macro step, {name}' for name in INTEGRATORS)):.2f}")
+
+
+def _clocked(made: dict[str, Callable[[], object]]) -> dict[str, Callable[[], float]]:
+    return {name: partial(spent, call) for name, call in made.items()}
+
+
+def _by(times: dict[str, np.ndarray], name: str) -> str:
+    return f"{ratio(times, name, 'iteration, generalized-alpha'):.2f}"
 
 
 if __name__ == "__main__":
-    main()
+    main(*map(int, sys.argv[1:]))
