@@ -84,9 +84,7 @@ class Benchmark:
         names = sorted((name for name in times if name.startswith(kind)), key=self.errors.__getitem__)
         errors = np.log([self.errors[name] for name in names])
         costs = np.log([times[name] for name in names])
-        return np.array(
-            [np.exp(np.interp(np.log(WANTED), errors, row, left=np.nan, right=np.nan)) for row in costs.T]
-        )
+        return np.array([np.exp(np.interp(np.log(WANTED), errors, row, left=np.nan, right=np.nan)) for row in costs.T])
 
 
 def main(rounds: int = 3, stop: float = 5.0) -> None:

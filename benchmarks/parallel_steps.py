@@ -12,6 +12,7 @@ from __future__ import annotations
 
 import sys
 import threading
+from functools import partial
 from time import perf_counter, process_time
 
 import numpy as np
@@ -70,13 +71,13 @@ def main(count: int = 100, rounds: int = 5) -> None:
     print("work in a step, µs   serial   threads  ratio      auto  ratio  CPU by serial  auto chose")
     for duration in DURATIONS:
         contest = Contest(duration, count)
-        cpu = turns({way: lambda way=way: contest.run(way) for way in PARALLEL}, rounds)
+        cpu = turns({way: partial(contest.run, way) for way in PARALLEL}, rounds)
         wall = {way: np.array(times) for way, times in contest.wall.items()}
         serial, threaded, auto = (1e6 * np.median(times) for times in wall.values())
         gains = [ratio(wall, "never", way) for way in ("always", "auto")]
-        print(f"{1e6 * duration:18.0f} {serial:8.1f} {threaded:9.1f} {gains[0]:6.2f} {auto:9.1f} {gains[1]:6.2f}", end="")
+        row = f"{1e6 * duration:18.0f} {serial:8.1f} {threaded:9.1f} {gains[0]:6.2f} {auto:9.1f} {gains[1]:6.2f}"
         chosen = contest.threads["auto"]
-        print(f"{ratio(cpu, 'always', 'never'):15.2f}  threads {sum(chosen)} times of {len(chosen)}")
+        print(f"{row}{ratio(cpu, 'always', 'never'):15.2f}  threads {sum(chosen)} times of {len(chosen)}")
 
 
 if __name__ == "__main__":

@@ -39,5 +39,5 @@ def test_an_end_of_the_bracket_may_be_the_root():
 
 
 def test_a_function_without_numbers_has_no_root():
-    with pytest.raises(ValueError, match="no root between|different signs"):
+    with pytest.raises(ValueError, match=r"no root between|different signs"):
         root(lambda x: float("nan") if 0.2 < x < 0.8 else x - 0.5, 0.0, 1.0)
