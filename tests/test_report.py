@@ -100,15 +100,19 @@ def test_the_overview_shows_all_wheels_and_angles(tmp_path: Path, n_wheels: int)
     assert [axis.get_ylabel() for axis in figure.axes] == [
         "Z displacement [m]", "Angle [°]", "Contact force [N]", "Cable tension [kN]",
     ]  # fmt: skip
-    assert np.array_equal(lines(figure)[0], Z - Z[0]) and lines(figure, 2)[-1].max() == 400.0 + n_wheels
+    assert lines(figure)[0] == pytest.approx(Z - Z[0], abs=1e-15)
+    assert lines(figure, 2)[-1].max() == 400.0 + n_wheels
     names = [text.get_text() for text in figure.axes[2].get_legend().get_texts()]
-    assert names == [f"wheel {k + 1}" for k in range(n_wheels if n_wheels > 1 else 0)] + ["in the air, 0.3 s"]
+    assert names == [f"wheel {k + 1}" for k in range(n_wheels if n_wheels > 1 else 0)] + ["in the air, 0.29 s"]
     require_inside(figure)
     assert imread(tmp_path / "a.png").shape[2] == 4 and not list(tmp_path.glob(".*"))
 
 
-def test_a_legend_in_the_axes_hides_no_curve(tmp_path: Path):
-    figure = plots.overview(tmp_path / "a.png", landing(4), None, panels_for(landing(4)), flight(landing(4)))
+@pytest.mark.parametrize("n_wheels", [1, 3, 4, 8])
+def test_a_legend_in_the_axes_hides_no_curve(tmp_path: Path, n_wheels: int):
+    table = landing(n_wheels)
+    figure = plots.overview(tmp_path / "a.png", table, None, panels_for(table), flight(table))
+    figure.draw_without_rendering()  # at the figure's own resolution, as the places of the axes are
     for axis in (figure.axes[1], figure.axes[2]):
         box = axis.get_legend().get_window_extent()
         assert axis.bbox.x0 <= box.x0 and box.x1 <= axis.bbox.x1 and box.y1 <= axis.bbox.y1
@@ -173,6 +177,13 @@ def test_errors_of_all_runs_with_all_their_names(tmp_path: Path, n: int):
         assert line == pytest.approx(np.full(line.size, expected), rel=1e-6)
 
 
+def test_a_signal_without_an_error_is_drawn_as_nothing(tmp_path: Path):
+    reference = landing()
+    runs = {"exact": landing(), "exact too": landing()}
+    plots.errors(tmp_path / "errors.png", runs, reference, panels_for(reference))
+    assert (tmp_path / "errors.png").is_file()
+
+
 def test_iterations_of_all_runs(tmp_path: Path):
     tables = {f"iqn_ils, {k} ms": made_up(landing()).iterations for k in range(8)}
     figure = plots.iterations(tmp_path / "a.png", tables)
@@ -207,7 +218,8 @@ def test_shapes_are_smooth_and_exact_at_the_points(tmp_path: Path):
     for curve in curves:
         z = np.asarray(curve.get_ydata(), float)
         assert z.size == 12 * 40 + 1 and np.all(np.isfinite(z))
-        assert np.min(np.abs(fields["position"][:, :, 2] - z[::12]).max(axis=1)) == 0.0, "exact at the points"
+        off = np.abs(fields["position"][:, :, 2] - z[::12]).max(axis=1)
+        assert np.min(off) <= 1e-14, "exact at the points, but for the rounding of a parabola 2 m high"
     for change in changes:  # no swing beside the kink: what lies between points lies between their values, but for 3 %
         at, scale = change[::12], np.ptp(change)
         low, high = np.minimum(at[1:], at[:-1]), np.maximum(at[1:], at[:-1])

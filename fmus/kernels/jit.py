@@ -23,6 +23,7 @@ from types import ModuleType
 from typing import Any
 
 import llvmlite
+import llvmlite.binding as llvm
 import numba
 import numpy as np
 
@@ -32,6 +33,11 @@ from fmus.kernels.compilation import Compilation
 LIBRARIES = {*sys.stdlib_module_names, "numba", "numpy", "scipy", "llvmlite"} - {"__main__"}
 """What is not looked into: their versions, not their sources, decide over the compiled code."""
 VERSIONS = f"{sys.version} {numba.__version__} {llvmlite.__version__} {np.__version__}"
+PROCESSOR = (
+    f"{numba.config.CPU_NAME or llvm.get_host_cpu_name()} "  # type: ignore[attr-defined]
+    f"{numba.config.CPU_FEATURES or llvm.get_host_cpu_features().flatten()}"  # type: ignore[attr-defined]
+)
+"""Two kinds of processor that share a home do not share a folder of code: each numbers its files by itself."""
 IMPORT = re.compile(
     r"^[ \t]*(?:from[ \t]+([\w.]+)[ \t]+import[ \t]+(\([^)]*\)|[^\n]*)|import[ \t]+([^\n]+))", re.MULTILINE
 )
@@ -87,7 +93,7 @@ def _cached_in(folder: Path) -> Iterator[None]:
 @cache
 def code_folder(module: str) -> Path:
     """Return the folder of compiled code of the kernels in `module`, which has been imported up to them."""
-    digest = hashlib.sha256(VERSIONS.encode())
+    digest = hashlib.sha256(f"{VERSIONS} {PROCESSOR}".encode())
     for name, content in sorted(sources(module).items()):
         digest.update(f"\0{name}\0{len(content)}\0".encode() + content)
     parent = user_folder("kernels")

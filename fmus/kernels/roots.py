@@ -1,6 +1,6 @@
 """The root of a function of one variable, by Brent's method.
 
-SciPy has it too, to the last bit the same (the tests hold one against the other). But to import `scipy.optimize` takes as
+SciPy has it too (the tests hold one against the other). But to import `scipy.optimize` takes as
 long as all else that a short run imports, and an FMU that needs NumPy and Numba alone has more hosts.
 """
 
@@ -8,6 +8,7 @@ from __future__ import annotations
 
 from collections.abc import Callable
 from dataclasses import dataclass
+from math import isnan
 
 EPS = 2.0**-52
 MOST_ITERATIONS = 100
@@ -70,7 +71,7 @@ def root(
 
     Raises
     ------
-    ValueError : `function` has the same sign at both ends, or the iterations do not end
+    ValueError : `function` has the same sign at both ends or is not a number, or the iterations do not end
     """
     at = _Points(high, float(function(high)), low, float(function(low)))
     if at.f_old == 0.0:
@@ -88,4 +89,6 @@ def root(
         at.x_old, at.f_old = at.x, at.f
         at.x += at.step if abs(at.step) > delta else (delta if half > 0.0 else -delta)
         at.f = float(function(at.x))
+        if isnan(at.f):
+            raise ValueError(f"f({at.x:g}) is not a number")
     raise ValueError(f"no root between {low:g} and {high:g} after {MOST_ITERATIONS} iterations")

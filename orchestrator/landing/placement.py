@@ -5,16 +5,17 @@ The cable is looked at in the vertical plane through its supports, in which it h
 
 from __future__ import annotations
 
+from collections.abc import Callable
 from dataclasses import dataclass
 
 import numpy as np
-from scipy.optimize import least_squares, root_scalar
 
 from fmus.cable.assembly import interpolate
 from fmus.cable.module import Cable
 from fmus.contact import places as at
 from fmus.contact.law import law_parameters
 from fmus.contact.module import Contact
+from fmus.kernels.roots import root
 from fmus.kernels.rotations import from_euler, rotate
 from fmus.module.variables import ModuleError
 from fmus.robot.module import Robot
@@ -74,17 +75,13 @@ def place(
         arms = np.array([rotate(q, *mount) for mount in mounts])
         return np.array([0.0, unknown[0], unknown[1]]) + arms
 
-    def misfit(unknown: np.ndarray) -> np.ndarray:
-        feet = [_foot(cable, centre) for centre in centres(unknown)]
-        gaps = [foot[1] - distance for foot in feet]
-        middle = np.mean([foot[2] for foot in feet]) - position
-        free_roll = [0.0] if robot.n_wheels > 1 else [unknown[2]]
-        return np.array([*gaps, middle, *free_roll])
-
-    start = np.array([position, _height(cable, position) + distance - np.mean(mounts[:, 2]), 0.0])
-    found = least_squares(misfit, start, xtol=1e-15, ftol=1e-15, gtol=1e-15, x_scale=[1.0, 1.0, 0.1]).x
-    if robot.n_wheels > 2:  # roll and height cannot make all of them touch: no wheel may start pressed in
-        found[1] -= min(_foot(cable, centre)[1] - distance for centre in centres(found))
+    point = _point(cable, arc_length_at(cable, position))
+    normal = np.array([-point[5], point[4]]) / np.hypot(*point[4:6])
+    above = point[1:3] + distance * normal  # where the centre of a wheel over the landing point is
+    if robot.n_wheels == 1:
+        found = np.array([*(above - centres(np.zeros(3))[0, 1:]), 0.0])
+    else:
+        found = _all_touching(cable, centres, distance, position, above[1] - np.mean(mounts[:, 2]))
     feet = [_foot(cable, centre) for centre in centres(found)]
     lateral = float(np.mean(centres(found)[:, 0]))
     initial = {
@@ -95,6 +92,24 @@ def place(
         "initial.roll": float(angles[0] + found[2]),
     }
     return Placement(initial, [foot[0] for foot in feet], cable["unstretched_length"])
+
+
+def _all_touching(
+    cable: Cable, centres: Callable[[np.ndarray], np.ndarray], distance: float, position: float, height: float
+) -> np.ndarray:
+    """Return y, z and turn in roll (3,) with which several wheels touch, their middle over `position`."""
+    from scipy.optimize import least_squares  # the import takes as long as all else that a short run imports
+
+    def misfit(unknown: np.ndarray) -> np.ndarray:
+        feet = [_foot(cable, centre) for centre in centres(unknown)]
+        middle = np.mean([foot[2] for foot in feet]) - position
+        return np.array([*(foot[1] - distance for foot in feet), middle])
+
+    start = np.array([position, height, 0.0])
+    found = least_squares(misfit, start, xtol=1e-15, ftol=1e-15, gtol=1e-15, x_scale=[1.0, 1.0, 0.1]).x
+    if len(centres(found)) > 2:  # roll and height cannot make all of them touch: no wheel may start pressed in
+        found[1] -= min(_foot(cable, centre)[1] - distance for centre in centres(found))
+    return found
 
 
 def _mount(robot: Robot, k: int) -> np.ndarray:
@@ -108,16 +123,10 @@ def _point(cable: Cable, s: float) -> np.ndarray:
     return out
 
 
-def _height(cable: Cable, y: float) -> float:
-    """Return z of the cable over the horizontal position `y`."""
-    return float(_point(cable, arc_length_at(cable, y))[2])
-
-
 def arc_length_at(cable: Cable, y: float) -> float:
     """Return the unstretched arc length at the horizontal position `y` of the cable at rest."""
     length = float(cable.model.s[-1])
-    found = root_scalar(lambda s: _point(cable, s)[1] - y, bracket=(0.0, length), xtol=1e-12 * length)
-    return float(found.root)
+    return root(lambda s: float(_point(cable, s)[1]) - y, 0.0, length, xtol=1e-12 * length)
 
 
 def _foot(cable: Cable, centre: np.ndarray) -> tuple[float, float, float]:

@@ -34,6 +34,7 @@ from orchestrator.report.style import (
 AIR = "0.93"
 """Colour of the spans in which no wheel touches."""
 LEGEND_SPACE = 0.2
+LEGEND_COLUMNS = 5
 """Part of an axis' range that is added above the curves for a legend."""
 BINS = 250
 """Spans of time of which largest values, ranges and means are drawn."""
@@ -91,13 +92,15 @@ def _shade(axis: Axes, flight: Flight) -> None:
 
 
 def _legend_inside(axis: Axes) -> None:
-    """Put a legend into the axes, in one line above all curves, if there is more than one thing to tell apart."""
+    """Put a legend into the axes, above all curves, if there is more than one thing to tell apart."""
     labels = axis.get_legend_handles_labels()[1]
     if not labels:
         return
+    columns = min(len(labels), LEGEND_COLUMNS)
     low, high = axis.get_ylim()
-    axis.set_ylim(low, high + LEGEND_SPACE * (high - low))
-    axis.legend(loc="upper right", ncols=len(labels), fontsize=7.5, handlelength=1.4, columnspacing=1.2, borderpad=0.1)
+    axis.set_ylim(low, high + LEGEND_SPACE * -(-len(labels) // columns) * (high - low))
+    size = 7.5 if columns < LEGEND_COLUMNS else 6.5
+    axis.legend(loc="upper right", ncols=columns, fontsize=size, handlelength=1.4, columnspacing=1.0, borderpad=0.1)
 
 
 def _name_both(figure: Figure) -> None:
@@ -128,7 +131,10 @@ def _logarithmic(axis: Axes, time: np.ndarray, values: np.ndarray, **style: obje
     groups = np.array_split(np.arange(len(time)), min(BINS, len(time)))
     largest = np.array([values[group].max() for group in groups])
     middle = np.array([time[group].mean() for group in groups])
-    axis.semilogy(middle, above_zero(largest), **{"linewidth": 0.9} | style)  # type: ignore[arg-type]
+    values = above_zero(largest)
+    if not np.isfinite(values).any():
+        style = style | {"markevery": None}  # a line without a point has no length to space marks along
+    axis.semilogy(middle, values, **{"linewidth": 0.9} | style)  # type: ignore[arg-type]
 
 
 def errors(path: Path, runs: Mapping[str, Table], reference: Table, panels: Sequence[Panel]) -> Figure:
