@@ -7,8 +7,9 @@ import numpy as np
 from fmus.cable import dynamics, ports
 from fmus.cable.assembly import Model, interpolate
 from fmus.cable.diagnosis import diagnose
+from fmus.cable.mesh import MOST, TOLERANCE, Line, automatic, nodes
 from fmus.cable.state import N_PORTS, NOT_FINITE, OFF_CABLE, OK, factorise_mass, make_work, state_size
-from fmus.cable.statics import equilibrium, mesh_model
+from fmus.cable.statics import catenary, equilibrium, mesh_model
 from fmus.kernels.roots import root
 from fmus.kernels.time_integration import collocation, generalized_alpha
 from fmus.module.variables import (
@@ -25,6 +26,8 @@ from fmus.module.variables import (
 
 N_SHAPE = 41
 """Points at which the shape of the cable is shown, equally spaced in unstretched arc length."""
+N_CATENARY = 401
+"""Points of the catenary on which landing points are found: to 1e-5 of the length, a mesh asks for no more."""
 
 
 _PARAMETERS = [
@@ -42,12 +45,35 @@ _PARAMETERS = [
         "n_elements",
         "parameter",
         "1",
-        20,
-        "number of elements",
+        0,
+        "number of elements; 0: found from mesh_tolerance, together with their lengths",
         kind="integer",
-        bounds=Bounds(ge=1, le=5000),
+        bounds=Bounds(ge=0, le=MOST),
     ),
-    parameter("grading", "1", 1.0, "ratio of the longest to the shortest element; 1: equal elements", Bounds(ge=1.0)),
+    parameter(
+        "mesh_tolerance",
+        "1",
+        TOLERANCE,
+        "error of the motion, by its range, that a mesh found by itself may leave",
+        Bounds(gt=0.0, le=0.1),
+    ),
+    *(
+        parameter(
+            f"landing[{k + 1}].position",
+            "m",
+            -1.0,
+            "horizontal distance from the left support at which a wheel lands, for a mesh found by itself; negative: none",
+        )
+        for k in range(N_PORTS)
+    ),
+    parameter("landing_load", "N", 0.0, "weight of what lands, for a mesh found by itself", NON_NEGATIVE),
+    parameter(
+        "grading",
+        "1",
+        1.0,
+        "ratio of the longest to the shortest of n_elements; 1: equal elements",
+        Bounds(ge=1.0),
+    ),
     parameter(
         "grading_position",
         "m",
@@ -179,13 +205,15 @@ class Cable:
 
     def _rest(self, length: float) -> tuple[Model, np.ndarray]:
         """Return the cable of the given unstretched length and its equilibrium (n,)."""
-        model = mesh_model(
+        model = self._model(self._nodes(length))
+        return model, equilibrium(model, self["span"], self["level_difference"])
+
+    def _model(self, s: np.ndarray) -> Model:
+        """Return the cable with nodes at the arc lengths `s`, m."""
+        return mesh_model(
+            s,
             span=self["span"],
             level_difference=self["level_difference"],
-            unstretched_length=length,
-            n_elements=int(self["n_elements"]),
-            grading=self["grading"],
-            grading_position=self["grading_position"],
             ea=self["axial_stiffness"],
             ei=self["bending_stiffness"],
             damping=self["damping_time"],
@@ -193,7 +221,27 @@ class Cable:
             gravity=self["gravity"],
             clamped=bool(self["clamped"]),
         )
-        return model, equilibrium(model, self["span"], self["level_difference"])
+
+    def _nodes(self, length: float) -> np.ndarray:
+        """Return the arc lengths of the nodes (n_elements + 1,) of the cable of the given unstretched length."""
+        if self["n_elements"] >= 1.0:
+            return nodes(length, int(self["n_elements"]), self["grading"], self["grading_position"])
+        if self["grading"] > 1.0:
+            raise ModuleError(
+                "cable: grading: needs n_elements; without any of n_elements, grading and grading_position the mesh is "
+                "found by itself"
+            )
+        weight = self["linear_density"] * self["gravity"]
+        ea, ei = self["axial_stiffness"], self["bending_stiffness"]
+        line = Line(self["span"], self["level_difference"], length, ea, ei, weight, bool(self["clamped"]))
+        return automatic(line, self._landing_arcs(length), self["landing_load"], self["mesh_tolerance"])
+
+    def _landing_arcs(self, length: float) -> np.ndarray:
+        """Return the arc lengths (m) at which wheels land, on the catenary of the given unstretched length."""
+        wanted = np.array([self[f"landing[{k + 1}].position"] for k in range(N_PORTS)])
+        model = self._model(np.linspace(0.0, length, N_CATENARY))
+        y = catenary(model, self["span"], self["level_difference"])[1::6]
+        return np.interp(wanted[wanted >= 0.0], y, model.s)
 
     def _length_for_sag(self) -> float:
         """Return the unstretched length with which the equilibrium has the sag wanted."""

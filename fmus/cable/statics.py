@@ -13,7 +13,6 @@ from fmus.cable.assembly import (
     internal_force,
     iteration_matrix,
 )
-from fmus.cable.mesh import nodes
 from fmus.kernels import banded
 from fmus.kernels.roots import root
 from fmus.module.variables import ModuleError
@@ -24,13 +23,10 @@ TOLERANCE = 1e-13
 
 
 def mesh_model(
+    s: np.ndarray,
     *,
     span: float,
     level_difference: float,
-    unstretched_length: float,
-    n_elements: int,
-    grading: float,
-    grading_position: float,
     ea: float,
     ei: float,
     damping: float,
@@ -38,12 +34,14 @@ def mesh_model(
     gravity: float,
     clamped: bool,
 ) -> Model:
-    """Return the meshed cable; the left support is the origin, the right one (0, span, level_difference)."""
-    s = nodes(unstretched_length, n_elements, grading, grading_position)
+    """Return the cable with nodes at the arc lengths `s` (n + 1,), m.
+
+    The left support is the origin, the right one (0, span, level_difference).
+    """
     weight = np.zeros(6 * s.size)
     l = np.diff(s)
     for offset, share in ((2, l / 2), (5, l**2 / 12), (8, l / 2), (11, -(l**2) / 12)):
-        np.add.at(weight, 6 * np.arange(n_elements) + offset, -density * gravity * share)
+        np.add.at(weight, 6 * np.arange(l.size) + offset, -density * gravity * share)
     chord = np.array([0.0, span, level_difference]) / np.hypot(span, level_difference)
     free = np.outer(chord, chord) if clamped else np.eye(3)
     return Model(s, ea, ei, damping, density, gravity, weight, np.stack([free, free]))

@@ -64,8 +64,7 @@ def place(
     span = cable["span"]
     if not 0.0 < position < span:
         raise ModuleError(f"landing.position = {position:g} m is off the span; choose one between 0 and {span:g} m")
-    names = [f"initial.{a}" for a in ("roll", "pitch", "yaw")]
-    angles = np.array([robot.values[robot.table.index[n]] for n in names])
+    angles = _angles(robot)
     mounts = np.array([_mount(robot, k) for k in range(robot.n_wheels)])
     distance = touching_distance(contact)
 
@@ -92,6 +91,19 @@ def place(
         "initial.roll": float(angles[0] + found[2]),
     }
     return Placement(initial, [foot[0] for foot in feet], cable["unstretched_length"])
+
+
+def wheels_along(robot: Robot) -> np.ndarray:
+    """Return how far along the span the wheels are from their middle (n_wheels,), m, at the robot's initial angles."""
+    q = np.zeros(4)
+    from_euler(*_angles(robot), q)
+    along = np.array([rotate(q, *_mount(robot, k))[1] for k in range(robot.n_wheels)])
+    return along - np.mean(along)
+
+
+def _angles(robot: Robot) -> np.ndarray:
+    """Return the initial roll, pitch and yaw (3,), rad."""
+    return robot.values[robot.table.indices(f"initial.{a}" for a in ("roll", "pitch", "yaw"))]
 
 
 def _all_touching(

@@ -20,11 +20,13 @@ from orchestrator.catalogue.robot_spec import RobotSpec, load_robot
 from orchestrator.coupling.errors import InputError
 from orchestrator.coupling.fmu.instance import Fmu
 from orchestrator.landing.contract import BREAKS, check_variables
-from orchestrator.landing.placement import Placement, place
+from orchestrator.landing.placement import Placement, place, wheels_along
 from orchestrator.scenario.types import LandingScenario
 
 Variables = Mapping[str, Variable]
 MOST_WHEELS = 4
+MESH_KEYS = ("n_elements", "grading", "grading_position")
+"""Parameters of the cable that give its mesh; without any of them it is found from where the wheels land."""
 
 
 @dataclass(frozen=True)
@@ -177,7 +179,18 @@ def _landing(scenario: LandingScenario, sources: Sources, placement: Placement) 
 
 def _cable(scenario: LandingScenario, sources: Sources) -> Part:
     section, shown = scenario.cable, _shown(scenario.cable.fmu, sources.variables["cable"], Cable.table)
-    return Part(_path(section.fmu), section.steps, section.parameters, shown | section.parameters)
+    settings = _mesh(scenario, sources) | section.parameters
+    return Part(_path(section.fmu), section.steps, settings, shown | settings)
+
+
+def _mesh(scenario: LandingScenario, sources: Sources) -> dict[str, Value]:
+    """Return what a cable that finds its mesh by itself has to know: where wheels land, and how heavy they are."""
+    known, robot = sources.variables["cable"], robot_module(_robot(scenario, sources), sources.n_wheels)
+    if set(MESH_KEYS) & set(scenario.cable.parameters) or "landing_load" not in known:
+        return {}
+    wheels = scenario.landing.position + wheels_along(robot)
+    load = float(robot.values[robot.table.index["mass"]] * robot.values[robot.table.index["gravity"]])
+    return {f"landing[{k + 1}].position": float(y) for k, y in enumerate(wheels)} | {"landing_load": load}
 
 
 def _robot(scenario: LandingScenario, sources: Sources) -> Part:
