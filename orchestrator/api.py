@@ -263,7 +263,7 @@ def _run(system: System, progress: Progress, estimate: bool = True) -> Run:
     label = run_label(simulation.master, simulation.macro_step)
     coupled = run_coupled(system, _told(progress, label, system.scenario))
     if estimate:
-        estimate_error(coupled, _told(progress, f"error estimate, {simulation.estimate} run", system.scenario))
+        estimate_error(coupled, lambda part: _told(progress, f"error estimate: {part}", system.scenario))
     COMPILATION.conclude()
     return result(coupled)
 

@@ -14,7 +14,7 @@ import numpy as np
 from fmus.kernels.roots import root
 
 TOLERANCE = 5e-4
-"""Error of the motion by its range at which the sizes below stand; elements shrink with its fourth root, as their order is 4."""
+"""Error of the motion, by its range, at which the sizes below stand; elements shrink with its fourth root: their order is 4."""
 AT_WHEEL, AT_CLAMP, AT_PIN = 0.6, 0.5, 1.5
 """Length of the elements there, in bending layers."""
 NEAR = 10.0

@@ -231,10 +231,17 @@ class Cable:
                 "cable: grading: needs n_elements; without any of n_elements, grading and grading_position the mesh is "
                 "found by itself"
             )
+        return automatic(self._line(length), self._landing_arcs(length), self["landing_load"], self["mesh_tolerance"])
+
+    @property
+    def line(self) -> Line:
+        """The cable as far as its mesh depends on it, once its unstretched length is known."""
+        return self._line(self["unstretched_length"])
+
+    def _line(self, length: float) -> Line:
         weight = self["linear_density"] * self["gravity"]
         ea, ei = self["axial_stiffness"], self["bending_stiffness"]
-        line = Line(self["span"], self["level_difference"], length, ea, ei, weight, bool(self["clamped"]))
-        return automatic(line, self._landing_arcs(length), self["landing_load"], self["mesh_tolerance"])
+        return Line(self["span"], self["level_difference"], length, ea, ei, weight, bool(self["clamped"]))
 
     def _landing_arcs(self, length: float) -> np.ndarray:
         """Return the arc lengths (m) at which wheels land, on the catenary of the given unstretched length."""

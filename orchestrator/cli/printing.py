@@ -6,6 +6,7 @@ import sys
 from collections.abc import Callable, Iterable, Iterator, Mapping, Sequence
 from contextlib import contextmanager
 from io import TextIOWrapper
+from math import isnan
 from typing import TYPE_CHECKING
 
 import typer
@@ -14,6 +15,7 @@ if TYPE_CHECKING:
     from orchestrator.landing.contract import Finding
     from orchestrator.landing.modes import CableModes
     from orchestrator.runs.compare import Comparison
+    from orchestrator.runs.errors import Parts
     from orchestrator.runs.result import Run
 
 COLOURS = {"ok": "green", "pass": "green", "missing": "red", "wrong": "red", "FAIL": "red", "advice": "yellow"}
@@ -38,25 +40,39 @@ def print_run(run: Run) -> None:
         f"{summary['iterations_per_step']:.2f} iterations a step, {summary['unconverged_steps']} unconverged, "
         f"{summary['wall_s']:.2f} s"
     )
-    for line in (*(f"in the air: {line}" for line in in_the_air(run.table)), *_estimates(run)):
-        print(line)
+    for line in in_the_air(run.table):
+        print(f"in the air: {line}")
+    _print_estimates(run)
     if run.energy is not None:
         print(f"energy drift: {run.energy.drift:.2g} J of {run.energy.exchanged:.3g} J exchanged")
 
 
-def _estimates(run: Run) -> Iterator[str]:
-    """Yield a line for each signal with a tolerance: its estimated error beside what is allowed."""
-    from orchestrator.runs.result import CONSTANT
+def _print_estimates(run: Run) -> None:
+    """Print the estimated error of each signal judged by its parts, as shares of its range."""
+    from orchestrator.runs.errors import NAMES, range_of
 
-    for name, error in run.estimated_error.items():
-        values, tolerance = run.table[name], run.tolerances[name]
-        share = error / max(float(values.max() - values.min()), CONSTANT)
-        if run.estimate_failure:
-            kind = run.summary["estimate"]
-            yield f"estimated error of {name}: not known, the {kind} run failed: {run.estimate_failure}"
-            continue
-        verdict = "within" if share <= tolerance else "MISSED"
-        yield f"estimated error of {name}: {error:.1e} ({share:.1e} of its range, allowed {tolerance:g}): {verdict}"
+    if not run.error_parts:
+        return
+    covered = next(iter(run.error_parts.values())).covered
+    print(f"estimated error, by the signal's range; it covers {', '.join(covered)}")
+    rows = [_error_row(name, parts, range_of(run.table[name]), run) for name, parts in run.error_parts.items()]
+    print_table(("signal", *NAMES.values(), "sum", "allowed", "verdict"), rows)
+    if run.estimate_failure:
+        print(f"estimated error: not known, {run.estimate_failure}")
+
+
+def _error_row(name: str, parts: Parts, scale: float, run: Run) -> tuple[str, ...]:
+    shares = [None if part is None else part / scale for part in (parts.coupling, parts.inner_steps, parts.mesh)]
+    cells = ["–" if share is None else _share(share) for share in (*shares, parts.total / scale)]
+    tolerance = run.tolerances.get(name)
+    if tolerance is None:
+        return (name, *cells, "", "")
+    verdict = "not known" if isnan(parts.total) else "within" if parts.total <= tolerance * scale else "MISSED"
+    return (name, *cells, f"{tolerance:g}", verdict)
+
+
+def _share(share: float) -> str:
+    return "?" if isnan(share) else f"{share:.1e}"
 
 
 # -- a comparison ---------------------------------------------------------------------------------------------
@@ -71,7 +87,8 @@ def print_comparison(comparison: Comparison) -> None:
         if (warning := energy.warning()) is not None:
             complain(f"reference: {warning}")
     print_table(("master", "H [s]", "iterations", "unconverged", "cable steps", "wall [s]"), _costs(comparison))
-    print_table(("master", "H [s]", "signal", "relative error", "allowed", "verdict"), _checks(comparison))
+    print("error, by the signal's range; the coupling's includes that of the inner steps")
+    print_table(("master", "H [s]", "signal", "coupling", "mesh", "whole", "allowed", "verdict"), _checks(comparison))
     for master, orders in comparison.observed_order.items():
         shown = ", ".join(f"{name} {orders[name]:.2f}" for name in comparison.tolerance if name in orders)
         print(f"observed order, {master}: {shown}")
@@ -88,7 +105,8 @@ def _checks(comparison: Comparison) -> Iterator[tuple[str, ...]]:
 
     for c in comparison.checks:
         verdict = verdict_word(c.passed, c.note)
-        yield c.master, f"{c.macro_step:g}", c.signal, f"{c.error:.2e}", f"{c.tolerance:g}", verdict
+        shares = ("–" if share is None else f"{share:.2e}" for share in (c.coupling, c.mesh, c.error))
+        yield c.master, f"{c.macro_step:g}", c.signal, *shares, f"{c.tolerance:g}", verdict
 
 
 # -- what there is, what an FMU lacks, modes ------------------------------------------------------------------

@@ -11,6 +11,7 @@ from pathlib import Path
 
 import numpy as np
 
+from fmus.cable.mesh import TOLERANCE
 from fmus.cable.module import Cable
 from fmus.contact.module import Contact
 from fmus.module.variables import ModuleError, Value, Variable, VariableTable
@@ -20,11 +21,15 @@ from orchestrator.catalogue.robot_spec import RobotSpec, load_robot
 from orchestrator.coupling.errors import InputError
 from orchestrator.coupling.fmu.instance import Fmu
 from orchestrator.landing.contract import BREAKS, check_variables
+from orchestrator.landing.mesh import Mesh, mesh_of
 from orchestrator.landing.placement import Placement, place, wheels_along
 from orchestrator.scenario.types import LandingScenario
 
 Variables = Mapping[str, Variable]
 MOST_WHEELS = 4
+MESH_TOLERANCE = "mesh_tolerance"
+FOR_THE_MESH = 0.5
+"""Part of a tolerance that is left to the mesh."""
 MESH_KEYS = ("n_elements", "grading", "grading_position")
 """Parameters of the cable that give its mesh; without any of them it is found from where the wheels land."""
 
@@ -73,11 +78,13 @@ class Landing:
     ----------
     contact : of every wheel; the arc length under it is in `placement`
     placement : the start of the robot, and the arc length under each wheel
+    mesh : of our cable; None of a foreign one
     """
 
     scenario: LandingScenario
     sources: Sources
     placement: Placement
+    mesh: Mesh | None
     cable: Part
     robot: Part
     contact: Part
@@ -89,7 +96,11 @@ class Landing:
 
     def changed(self, scenario: LandingScenario) -> Landing:
         """Return the landing of a `scenario` that starts alike: with other steps or other options of the master."""
-        return _landing(scenario, self.sources, self.placement)
+        return _landing(scenario, self.sources, self.placement, self.mesh)
+
+    def meshed(self, scenario: LandingScenario) -> Landing:
+        """Return the landing of a `scenario` in which the mesh alone is another."""
+        return _landing(scenario, self.sources, *_placed(scenario, self.sources))
 
 
 def resolve(scenario: LandingScenario) -> Landing:
@@ -102,7 +113,7 @@ def resolve(scenario: LandingScenario) -> Landing:
     sources = _read(scenario)
     try:
         sources = replace(sources, mounts=_mounts(scenario, sources))
-        return _landing(scenario, sources, _placed(scenario, sources))
+        return _landing(scenario, sources, *_placed(scenario, sources))
     except ModuleError as error:
         raise InputError(f"{scenario.path}: {error}") from None
 
@@ -169,12 +180,12 @@ def _arm(fmu: Fmu, k: int, axis: str) -> float:
 # -- what follows from it -------------------------------------------------------------------------------------
 
 
-def _landing(scenario: LandingScenario, sources: Sources, placement: Placement) -> Landing:
+def _landing(scenario: LandingScenario, sources: Sources, placement: Placement, mesh: Mesh | None) -> Landing:
     robot, known = _robot(scenario, sources), sources.variables["robot"]
     initial = {name: value for name, value in placement.initial.items() if name in known}
     settings = dict(scenario.robot.parameters) | initial | scenario.robot.inputs
     robot = replace(robot, settings=settings, module=dict(robot.module) | placement.initial)
-    return Landing(scenario, sources, placement, _cable(scenario, sources), robot, _contact(scenario, sources))
+    return Landing(scenario, sources, placement, mesh, _cable(scenario, sources), robot, _contact(scenario, sources))
 
 
 def _cable(scenario: LandingScenario, sources: Sources) -> Part:
@@ -184,13 +195,22 @@ def _cable(scenario: LandingScenario, sources: Sources) -> Part:
 
 
 def _mesh(scenario: LandingScenario, sources: Sources) -> dict[str, Value]:
-    """Return what a cable that finds its mesh by itself has to know: where wheels land, and how heavy they are."""
+    """Return what a cable that finds its mesh by itself has to know: where wheels land, how heavy they are, how exactly.
+
+    Half of the smallest tolerance is left to the mesh, and never more than what it leaves by default.
+    """
     known, robot = sources.variables["cable"], robot_module(_robot(scenario, sources), sources.n_wheels)
     if set(MESH_KEYS) & set(scenario.cable.parameters) or "landing_load" not in known:
         return {}
     wheels = scenario.landing.position + wheels_along(robot)
-    load = float(robot.values[robot.table.index["mass"]] * robot.values[robot.table.index["gravity"]])
-    return {f"landing[{k + 1}].position": float(y) for k, y in enumerate(wheels)} | {"landing_load": load}
+    tolerance = min([TOLERANCE, *(FOR_THE_MESH * allowed for allowed in scenario.simulation.tolerances.values())])
+    found = {f"landing[{k + 1}].position": float(y) for k, y in enumerate(wheels)}
+    return found | {"landing_load": _weight(robot), MESH_TOLERANCE: tolerance}
+
+
+def _weight(robot: Robot) -> float:
+    """Return the robot's weight, N."""
+    return float(np.prod(robot.values[robot.table.indices(("mass", "gravity"))]))
 
 
 def _robot(scenario: LandingScenario, sources: Sources) -> Part:
@@ -221,8 +241,8 @@ def _shown(file: str | None, known: Variables, table: VariableTable) -> dict[str
     return {name: known[name].start for name in shared}
 
 
-def _placed(scenario: LandingScenario, sources: Sources) -> Placement:
-    """Return the start of the robot over the cable at rest."""
+def _placed(scenario: LandingScenario, sources: Sources) -> tuple[Placement, Mesh | None]:
+    """Return the start of the robot over the cable at rest, and the mesh of our cable."""
     cable = cable_module(_cable(scenario, sources))
     robot = robot_module(_robot(scenario, sources), sources.n_wheels)
     contact = contact_module(_contact(scenario, sources), 0.0)
@@ -232,7 +252,8 @@ def _placed(scenario: LandingScenario, sources: Sources) -> Placement:
     if scenario.robot.fmu is None:
         robot.table.assign(robot.values, placement.initial)
         robot.initialize(0.0)  # its mass and inertia are looked at before anything is run
-    return placement
+    mesh = mesh_of(cable, _weight(robot), landing.position, placement.arc_lengths)
+    return placement, mesh if scenario.cable.fmu is None else None
 
 
 # -- our modules ----------------------------------------------------------------------------------------------

@@ -5,7 +5,6 @@ from __future__ import annotations
 from collections.abc import Iterator, Mapping
 from pathlib import Path
 
-from fmus.module.variables import Value
 from orchestrator.catalogue import library
 from orchestrator.coupling.exchange import (
     EXCHANGES,
@@ -37,7 +36,10 @@ def landing_graph(landing: Landing, exchange: str) -> Graph:
     files = _files(landing)
     try:
         components["cable"] = instance(files["cable"], "cable", landing.cable.steps)
-        components["cable"].set_parameters(_inner_step(landing, EXCHANGES[exchange]) | dict(landing.cable.settings))
+        inner = (
+            {} if landing.cable.foreign is not None else {"integration_step": inner_step(landing, EXCHANGES[exchange])}
+        )
+        components["cable"].set_parameters(inner | dict(landing.cable.settings))
         components["robot"] = instance(files["robot"], "robot", landing.robot.steps)
         components["robot"].set_parameters(landing.robot.settings)
         possible = _possible(EXCHANGES[exchange], components)
@@ -62,12 +64,10 @@ def _files(landing: Landing) -> dict[str, Path]:
     return foreign | dict(zip(ours, library.kept(ours.values()), strict=True))
 
 
-def _inner_step(landing: Landing, exchange: Exchange) -> dict[str, Value]:
-    """Return the longest inner step of our own cable, where the scenario gives none."""
+def inner_step(landing: Landing, exchange: Exchange) -> float:
+    """Return the longest inner step (s) of our own cable where the scenario gives none."""
     step = landing.scenario.simulation.macro_step / exchange.inner_steps
-    if landing.scenario.master.get("local_tolerance"):
-        step = min(step, LONGEST_ADAPTIVE)
-    return {"integration_step": step} if landing.cable.foreign is None else {}
+    return min(step, LONGEST_ADAPTIVE) if landing.scenario.master.get("local_tolerance") else step
 
 
 def _possible(exchange: Exchange, components: Mapping[str, Fmu]) -> Exchange:

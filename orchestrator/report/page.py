@@ -4,6 +4,7 @@ from __future__ import annotations
 
 from collections.abc import Iterable, Iterator
 from html import escape
+from math import isnan
 from pathlib import Path
 from typing import Any
 
@@ -11,6 +12,7 @@ from orchestrator.coupling.errors import InputError, OrchestratorError
 from orchestrator.coupling.run.results import Table, read_json, replacing
 from orchestrator.report.signals import extremes, flight, in_the_air, panels_for
 from orchestrator.runs.compare import Comparison
+from orchestrator.runs.errors import NAMES, Parts
 from orchestrator.runs.files import read_comparison, read_run, require_finished
 from orchestrator.runs.result import Run, verdict_word
 
@@ -168,13 +170,13 @@ def _tables(results: Comparison | list[Run]) -> Iterator[list[tuple[str, ...]]]:
 
 
 def _comparison_rows(comparison: Comparison) -> list[tuple[str, ...]]:
-    head = ("master", "macro step [s]", "signal", "relative error", "tolerance", "verdict")
+    head = ("master", "macro step [s]", "signal", "coupling", "mesh", "whole error", "tolerance", "verdict")
     return [head] + [
         (
             c.master,
             f"{c.macro_step:g}",
             c.signal,
-            f"{c.error:.2e}",
+            *("–" if share is None else f"{share:.2e}" for share in (c.coupling, c.mesh, c.error)),
             f"{c.tolerance:g}",
             verdict_word(c.passed, c.note),
         )
@@ -188,10 +190,18 @@ def _summary_rows(run: Run) -> list[tuple[str, ...]]:
     shown += ("iterations_per_step", "unconverged_steps", "left_the_groove")
     energy = summary.get("energy") or {}
     rows = [("energy " + name, str(energy[name])) for name in ("drift_J", "exchanged_J", "verdict") if name in energy]
-    errors = summary.get("estimated_error", {}).items()
-    rows += [(f"estimated error of {name}", "not known" if e is None else f"{e:.2e}") for name, e in errors]
+    rows += [(f"estimated error of {name}", _error_words(parts)) for name, parts in run.error_parts.items()]
     rows += [("in the air", line) for line in in_the_air(run.table)]
     return [("what", "value"), *((name, str(summary[name])) for name in shown if name in summary), *rows]
+
+
+def _error_words(parts: Parts) -> str:
+    if isnan(parts.total):
+        return "not known"
+    values = (
+        f"{words} {getattr(parts, part):.2e}" for part, words in NAMES.items() if getattr(parts, part) is not None
+    )
+    return f"{parts.total:.2e} ({', '.join(values)})"
 
 
 def _write_page(

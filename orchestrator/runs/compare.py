@@ -2,7 +2,7 @@
 
 from __future__ import annotations
 
-from collections.abc import Mapping
+from collections.abc import Iterable, Mapping
 from dataclasses import asdict, dataclass, field
 from pathlib import Path
 from typing import Any
@@ -16,7 +16,9 @@ from orchestrator.coupling.run.compare import (
 )
 from orchestrator.coupling.run.results import Table
 from orchestrator.landing.audit import Audit, of_monolithic
-from orchestrator.runs.result import CONSTANT, EXIT_STATUS, Run, Verdict, pandas_module, run_label
+from orchestrator.runs.errors import CONSTANT, Parts, differences, judged
+from orchestrator.runs.result import EXIT_STATUS, Run, Verdict, pandas_module, run_label
+from orchestrator.runs.systems import MESH_ORDER
 
 REFERENCE_MARGIN = 0.1
 """The reference's own error may be this part of a tolerance, or the verdict means nothing."""
@@ -33,6 +35,7 @@ class Reference:
     wall_s : s
     estimated_error : its own error by signal, in the signal's unit
     fields : arrays over time, as in ``fields.h5``
+    finer : the signals on a mesh `mesh_ratio` times as fine as the runs'; None where no mesh is judged
     """
 
     kind: str
@@ -40,11 +43,34 @@ class Reference:
     wall_s: float
     estimated_error: dict[str, float]
     fields: dict[str, np.ndarray] = field(default_factory=dict)
+    finer: Table | None = None
+    mesh_ratio: float = float("nan")
+
+    def own_error(self, name: str, mesh: float | None) -> float | None:
+        """Return its own error of a signal, in its unit: estimated, with what the finer mesh leaves of the error `mesh`."""
+        known = self.estimated_error.get(name)
+        if known is None or mesh is None or not np.isfinite(self.mesh_ratio):
+            return known
+        return known + mesh * self.mesh_ratio**-MESH_ORDER
+
+    def parts(self, table: Table, names: Iterable[str]) -> dict[str, Parts]:
+        """Return the errors of a run's signals by their parts; that of the inner steps is in that of the coupling."""
+        names = [name for name in names if name in self.table]
+        coupling = differences(table, self.table, names)
+        if self.finer is None:
+            return {name: Parts(error, None, None, error) for name, error in coupling.items()}
+        by = 1.0 / (1.0 - self.mesh_ratio**-MESH_ORDER)
+        mesh, total = differences(self.table, self.finer, names), differences(table, self.finer, names)
+        return {name: Parts(coupling[name], None, by * mesh[name], total[name]) for name in names}
 
 
 @dataclass
 class RunErrors:
-    """One coupled run held against the reference: what it cost, and how wrong each signal is."""
+    """One coupled run held against the reference: what it cost, and how wrong each signal is.
+
+    `signals` are held against the reference on the run's own mesh: what the coupling costs. `errors` are those of the
+    signals judged, by their parts, the mesh's among them.
+    """
 
     master: str
     macro_step: float
@@ -54,6 +80,7 @@ class RunErrors:
     cable_steps: int
     wall_s: float
     signals: dict[str, SignalError]
+    errors: dict[str, Parts]
 
     @property
     def label(self) -> str:
@@ -63,7 +90,7 @@ class RunErrors:
 
 @dataclass(frozen=True)
 class Check:
-    """One line of the verdict: a signal of a run against its tolerance."""
+    """One line of the verdict: a signal of a run against its tolerance; its error and the parts are shares of its range."""
 
     master: str
     macro_step: float
@@ -72,6 +99,8 @@ class Check:
     tolerance: float
     passed: bool
     note: str = ""
+    coupling: float | None = None
+    mesh: float | None = None
 
 
 @dataclass(repr=False)
@@ -96,7 +125,7 @@ class Comparison:
     def checks(self) -> list[Check]:
         """Every tolerance held against every run."""
         return [
-            _check(run, signal, tolerance, self.reference.estimated_error.get(signal))
+            _check(run, signal, tolerance, self.reference)
             for run in self.runs
             for signal, tolerance in self.tolerance.items()
         ]
@@ -142,6 +171,7 @@ class Comparison:
                 "kind": reference.kind,
                 "wall_s": reference.wall_s,
                 "estimated_error": reference.estimated_error,
+                "mesh_ratio": reference.mesh_ratio if reference.finer is not None else None,
             },
             "runs": self.runs,
             "observed_order": self.observed_order,
@@ -167,11 +197,14 @@ class Comparison:
         """Return the comparison that ``comparison.json`` and ``reference.csv`` hold."""
         known = content["reference"]
         reference = Reference(known["kind"], table, known["wall_s"], _numbers(known["estimated_error"], "nan"))
-        runs = [
-            RunErrors(**{**run, "signals": {n: SignalError(**_numbers(e)) for n, e in run["signals"].items()}})
-            for run in content["runs"]
-        ]
-        return cls(reference, runs, content["tolerance"])
+        reference.mesh_ratio = _numbers({"": known["mesh_ratio"]})[""]
+        return cls(reference, [_run_errors(run) for run in content["runs"]], content["tolerance"])
+
+
+def _run_errors(content: Mapping[str, Any]) -> RunErrors:
+    signals = {name: SignalError(**_numbers(error)) for name, error in content["signals"].items()}
+    errors = {name: Parts.from_content(parts) for name, parts in content["errors"].items()}
+    return RunErrors(**{**content, "signals": signals, "errors": errors})
 
 
 def _numbers(values: Mapping[str, float | None], null: str = "inf") -> dict[str, float]:
@@ -179,18 +212,20 @@ def _numbers(values: Mapping[str, float | None], null: str = "inf") -> dict[str,
     return {name: float(null) if value is None else value for name, value in values.items()}
 
 
-def _check(run: RunErrors, signal: str, tolerance: float, estimate: float | None) -> Check:
-    error = run.signals.get(signal)
-    if error is None:
+def _check(run: RunErrors, signal: str, tolerance: float, reference: Reference) -> Check:
+    parts, error = run.errors.get(signal), run.signals.get(signal)
+    if error is None or parts is None:
         note = "not among the signals of run and reference"
         return Check(run.master, run.macro_step, signal, float("nan"), tolerance, False, note)
     scale = max(error.scale, CONSTANT)
-    value, note = error.max_error / scale, ""
-    if estimate is None:
+    value, own, note = parts.total / scale, reference.own_error(signal, parts.mesh), ""
+    if own is None:
         note = "the reference does not say how accurate it is"
-    elif not estimate <= REFERENCE_MARGIN * tolerance * scale:
-        note = f"reference not accurate enough: its own error is {estimate / scale:.1e}"
-    return Check(run.master, run.macro_step, signal, value, tolerance, value <= tolerance and not note, note)
+    elif not own <= REFERENCE_MARGIN * tolerance * scale:
+        note = f"reference not accurate enough: its own error is {own / scale:.1e}"
+    passed = value <= tolerance and not note
+    shares = (None if part is None else part / scale for part in (parts.coupling, parts.mesh))
+    return Check(run.master, run.macro_step, signal, value, tolerance, passed, note, *shares)
 
 
 def _orders(runs: list[RunErrors]) -> dict[str, float]:
@@ -213,6 +248,7 @@ def held_against(run: Run, reference: Reference) -> RunErrors:
         cable_steps=solves.get("cable", max(solves.values(), default=0)),
         wall_s=summary["wall_s"],
         signals=signal_errors(run.table, reference.table),
+        errors=reference.parts(run.table, judged(run.table, run.tolerances)),
     )
 
 

@@ -18,6 +18,7 @@ from orchestrator.coupling.run.results import Table
 from orchestrator.coupling.run.simulate import simulate
 from orchestrator.landing import audit
 from orchestrator.runs.components import master_of, opened, recorded
+from orchestrator.runs.errors import Parts, missed
 from orchestrator.runs.systems import System, resolve
 from orchestrator.scenario.types import Scenario
 
@@ -40,8 +41,8 @@ class Coupled:
     table : signals at the communication points, ``time`` first
     fields : arrays over time as in ``fields.h5``; empty for a general graph
     fmus : file and SHA-256 of every component
-    estimated_error : of the signals with a tolerance, in their units; empty where none was asked for, NaN where it failed
-    estimate_failure : why it failed
+    error_parts : estimated error of each signal judged; empty where no estimate was asked for
+    estimate_failure : which parts of it failed, and why
     """
 
     system: System
@@ -50,8 +51,18 @@ class Coupled:
     table: Table
     fields: dict[str, np.ndarray]
     fmus: dict[str, dict[str, str]]
-    estimated_error: dict[str, float] = field(default_factory=dict)
+    error_parts: dict[str, Parts] = field(default_factory=dict)
     estimate_failure: str = ""
+
+    @property
+    def estimated_error(self) -> dict[str, float]:
+        """Estimated error by signal, in its unit: the sum of its parts, NaN where one is not known."""
+        return {name: parts.total for name, parts in self.error_parts.items()}
+
+    @property
+    def misses(self) -> list[str]:
+        """The signals whose estimated error is larger than their tolerance allows."""
+        return missed(self.error_parts, self.scenario.simulation.tolerances, self.table)
 
     @property
     def scenario(self) -> Scenario:

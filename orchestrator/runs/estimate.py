@@ -1,37 +1,49 @@
-"""The error of a coupled run, estimated without a reference: the run is made once more, finer or coarser.
+"""The error of a coupled run, estimated without a reference: runs in which one part of it is refined.
 
-Macro step, inner steps and tolerances of the iteration change together, so that no part of the error is common to both
-runs. For an error of order p, e(H) ~ H^p, their largest difference d gives the error of the run at H (Richardson's
-rule):
+*Coupling*: macro step halved and tolerances of the iteration divided by ten, inner steps as they are. *Inner steps*: those of
+all components halved. *Mesh*: the monolithic solver, where there is one, on the run's mesh and on a finer one. For an
+error of order p, e(h) ~ h^p, the largest difference d from a run with steps (or elements) r times shorter gives
+(Richardson's rule)
 
-    finer, at H/2:   e(H) = d 2^p / (2^p - 1),  between d and 2 d for any p >= 1
-    coarser, at 2H:  e(H) = d / (2^p - 1),      between d / 15 and d for p from 4 to 1
+    e(h) = d / (1 - r^-p),    between d and 2 d for r = 2 and any p >= 1
 
-What the estimate depends on is whether the error falls with the step, and at H/2 it mostly does (docs/notebook/estimate.md).
+The sum of the parts is the error of the run. What no part has: the contact law, the data, a foreign FMU's own inner
+steps and mesh (docs/concepts/error.md).
 """
 
 from __future__ import annotations
 
+from collections.abc import Callable
 from typing import Any
 
-from orchestrator.coupling.errors import OrchestratorError
+import numpy as np
+
+from fmus.module.variables import ModuleError
+from orchestrator.coupling.errors import OrchestratorError, RunError
 from orchestrator.coupling.exchange import EXPLICIT_ORDER, exchange_named
 from orchestrator.coupling.masters import MASTERS
 from orchestrator.coupling.masters.options import master_options
-from orchestrator.coupling.run.compare import largest_difference
+from orchestrator.coupling.run.results import Table
 from orchestrator.runs.coupled import Coupled, Reached, completed
-from orchestrator.runs.systems import System
+from orchestrator.runs.errors import NAMES, Differences, Parts, differences, judged
+from orchestrator.runs.systems import MESH_ORDER, System
 from orchestrator.scenario.types import Scenario
 
 RATIOS = {"finer": 0.5, "coarser": 2.0}
-"""Estimate → steps of the second run over those of the first."""
+"""Estimate → macro step of the second run over that of the first."""
 TOLERANCES = {"tolerance": 10.0, "local_tolerance": 32.0}
 """By this the master's tolerances are multiplied where steps are doubled, and divided where they are halved: the error of
 the iteration changes about as much as that of the steps, a local error of order 5 as by doubled sub-steps."""
+INNER_ORDER = 3
+"""Order of the error of inner steps: that of our cable's collocation."""
+MESH_TOLERANCE = 1e-6
+"""m; local error of a monolithic step, which leaves 3e-7 of the flagship's range: a hundredth of what a mesh leaves."""
+Told = Callable[[str], Reached]
+"""Returns what is told the time that the run for a part has come to."""
 
 
 def factor(scenario: Scenario, exchange: str) -> float:
-    """Return what the largest difference between both runs is multiplied by to estimate the error.
+    """Return what the largest difference from the second run is multiplied by to estimate the error of the coupling.
 
     The order p of the error: 3 for `waveform`, which has 4 where the motion is smooth and about 2 where touch, lift-off
     or slip falls inside a step; 2 for other implicit coupling, of values at an instant; 1 at least for explicit coupling.
@@ -43,7 +55,10 @@ def factor(scenario: Scenario, exchange: str) -> float:
 
 
 def second(system: System) -> System | None:
-    """Return what the second run is made of; None if none is asked for, or one coarser of fewer than two macro steps."""
+    """Return what the second run is made of; None if none is asked for, or one coarser of fewer than two macro steps.
+
+    A finer one keeps the inner steps, which are a part of their own; in a coarser one they are doubled too.
+    """
     scenario = system.scenario
     ratio = RATIOS.get(scenario.simulation.estimate)
     if ratio is None:
@@ -52,8 +67,8 @@ def second(system: System) -> System | None:
     count = int(scenario.simulation.stop_time / step * (1.0 + 1e-9))
     if count < 2:
         return None
-    changed = system.changed(_options(scenario, ratio), macro_step=step, stop_time=count * step)
-    return changed.stepped(ratio)
+    inner = system.stepped(1.0 if ratio < 1.0 else ratio)
+    return inner.changed(_options(scenario, ratio), macro_step=step, stop_time=count * step)
 
 
 def _options(scenario: Scenario, ratio: float) -> dict[str, Any]:
@@ -63,26 +78,87 @@ def _options(scenario: Scenario, ratio: float) -> dict[str, Any]:
     return dict(scenario.master) | {n: all_options[n] * change for n, change in by.items() if all_options.get(n)}
 
 
-def estimate_error(coupled: Coupled, progress: Reached = lambda _: None) -> Coupled | None:
-    """Estimate the error of a finished run by a second one, and note it in `coupled`; a failure is noted, not raised.
+def estimate_error(coupled: Coupled, told: Told = lambda _: lambda _: None) -> Coupled | None:
+    """Estimate the parts of a finished run's error, and note them in `coupled`; a failure is noted, not raised.
 
     Returns
     -------
     Coupled or None
-        the second run; None where there is none, or it failed
+        the second run, that of the coupling; None where there is none, or it failed
     """
-    scenario = coupled.scenario
     again = second(coupled.system) if coupled.log.error is None else None
     if again is None:
         return None
-    signals = [name for name in scenario.simulation.tolerances if name in coupled.table]
-    coupled.estimated_error = dict.fromkeys(signals, float("nan"))
+    others: list[Coupled] = []
+    signals = judged(coupled.table, coupled.scenario.simulation.tolerances)
+    wanted = {
+        "coupling": lambda: _of_coupling(coupled, again, others, told("coupling")),
+        "inner_steps": lambda: _of_inner_steps(coupled, told("inner steps")),
+        "mesh": lambda: _of_mesh(coupled, told("mesh")),
+    }
+    found = {part: _attempted(coupled, part, make) for part, make in wanted.items()}
+    coupled.error_parts = {name: _parts({p: d and d.get(name) for p, d in found.items()}) for name in signals}
+    return others[0] if others else None
+
+
+def _attempted(coupled: Coupled, part: str, make: Callable[[], Differences | None]) -> Differences | None:
+    """Return the errors of a part by signal; NaN where its run failed, which is noted, None where there is no such part."""
     try:
-        other = completed(again, progress)
-    except OrchestratorError as error:
-        coupled.estimate_failure = str(error)
+        return make()
+    except (OrchestratorError, ModuleError) as error:
+        coupled.estimate_failure += f"{'; ' if coupled.estimate_failure else ''}{NAMES[part]}: {error}"
+        return dict.fromkeys(judged(coupled.table, coupled.scenario.simulation.tolerances), float("nan"))
+
+
+def _parts(values: dict[str, float | None]) -> Parts:
+    known = [value for value in values.values() if value is not None]
+    return Parts(**values, total=float(np.sum(known)))
+
+
+# -- the parts ------------------------------------------------------------------------------------------------
+
+
+def _of_coupling(coupled: Coupled, again: System, kept: list[Coupled], progress: Reached) -> Differences:
+    other = completed(again, progress)
+    kept.append(other)
+    return _scaled(coupled, other.table, factor(coupled.scenario, coupled.exchange))
+
+
+def _of_inner_steps(coupled: Coupled, progress: Reached) -> Differences | None:
+    """Return the errors of the inner steps; None where no component has them, or a coarser run has shown them already."""
+    again = coupled.system.stepped(0.5)
+    if coupled.scenario.simulation.estimate == "coarser" or again.scenario == coupled.scenario:
         return None
-    coarse, fine = sorted((coupled.table, other.table), key=lambda table: len(table["time"]))
-    difference, by = largest_difference(coarse, fine), factor(scenario, coupled.exchange)
-    coupled.estimated_error = {name: by * difference[name] for name in signals}
-    return other
+    return _scaled(coupled, completed(again, progress).table, 1.0 / (1.0 - 0.5**INNER_ORDER))
+
+
+def _of_mesh(coupled: Coupled, progress: Reached) -> Differences | None:
+    """Return the errors of the mesh; None where there is none, or it is that of a foreign FMU."""
+    system = coupled.system
+    finer = system.meshed()
+    if finer is None:
+        return None
+    by = 1.0 / (1.0 - finer.ratio**-MESH_ORDER) if np.isfinite(finer.ratio) else 1.0
+    if system.problem() is None or finer.system.problem() is None:
+        return _scaled(coupled, completed(finer.system, progress).table, by)
+    tables = [solved(one, coupled.table["time"], progress) for one in (system, finer.system)]
+    names = judged(coupled.table, coupled.scenario.simulation.tolerances)
+    return {name: by * value for name, value in differences(*tables, names).items()}
+
+
+def solved(system: System, times: np.ndarray, progress: Reached, tolerance: float = MESH_TOLERANCE) -> Table:
+    """Return the signals of the monolithic solution at `times` (n,), s; `RunError` if there is none."""
+    from orchestrator.landing import monolithic  # with its kernels, which other runs do not need
+
+    problem = system.problem()
+    assert problem is not None
+    try:
+        found = monolithic.solve(problem, times, tolerance, estimate=False, progress=progress)
+    except ModuleError as error:
+        raise RunError(str(error)) from None
+    return {"time": found.time, **found.signals}
+
+
+def _scaled(coupled: Coupled, other: Table, by: float) -> Differences:
+    names = judged(coupled.table, coupled.scenario.simulation.tolerances)
+    return {name: by * value for name, value in differences(coupled.table, other, names).items()}

@@ -14,13 +14,11 @@ import numpy as np
 from orchestrator.coupling.errors import DONE, FAILED, INTERRUPTED, MISSED
 from orchestrator.coupling.run.results import Table
 from orchestrator.landing import audit
+from orchestrator.runs.errors import CURES, NAMES, Parts, missed
 
 Verdict = Literal["within", "missed", "failed", "interrupted"]
 EXIT_STATUS: dict[Verdict, int] = {"within": DONE, "missed": MISSED, "failed": FAILED, "interrupted": INTERRUPTED}
 """What the command line ends with."""
-CONSTANT = 1e-6
-"""A signal that moves by less than this (m, rad …) counts as constant: errors are then held against this range, as for
-the roll of a landing at midspan, which is zero by symmetry."""
 
 
 @dataclass(frozen=True, eq=False, repr=False)
@@ -115,11 +113,16 @@ class Run:
     @property
     def estimated_error(self) -> dict[str, float]:
         """Estimated largest error by signal, in its unit; NaN where the estimate failed, empty where none was made."""
-        return {n: float("nan") if error is None else error for n, error in self.summary["estimated_error"].items()}
+        return {name: parts.total for name, parts in self.error_parts.items()}
+
+    @cached_property
+    def error_parts(self) -> dict[str, Parts]:
+        """The parts of the estimated error by signal: coupling, inner steps, mesh, and their sum."""
+        return {name: Parts.from_content(content) for name, content in self.summary["estimated_error"].items()}
 
     @property
     def estimate_failure(self) -> str:
-        """Why there is no estimate of the error; empty where there is one, or none was asked for."""
+        """Which parts of the estimate failed, and why; empty where it is whole, or none was asked for."""
         return self.summary["estimate_failure"]
 
     @property
@@ -136,8 +139,9 @@ class Run:
     def verdict(self) -> Verdict:
         """How the run ended, as the exit status of ``orchestrator run`` says it.
 
-        ``within``: every macro step converged and the robot is on the cable; ``missed``: not so; ``failed``,
-        ``interrupted``: the results end before the stop time.
+        ``within``: every macro step converged, the robot is on the cable, and no estimated error is larger than its
+        tolerance; ``missed``: not so; ``failed``, ``interrupted``: the results end before the stop time. A run without an
+        estimate (`estimated_error` empty or NaN) is judged by the rest alone.
         """
         return self.summary["verdict"]
 
@@ -158,13 +162,21 @@ class Run:
 
     @property
     def warnings(self) -> list[str]:
-        """What went wrong, a line each: unconverged steps, a fall, energy that drifts, the end before its time."""
+        """What went wrong, a line each: unconverged steps, a fall, energy that drifts, a tolerance missed …"""
         drift = self.energy.warning() if self.energy is not None else None
         lines = [self._unconverged()] if self.summary["unconverged_steps"] else []
         lines += [f"{contact}: the cable left the groove; the robot has fallen off" for contact in self.fallen]
         lines += [drift] if drift is not None else []
+        lines += self.summary["warnings"]
+        lines += [self._missed(name) for name in missed(self.error_parts, self.tolerances, self.table)]
         lines += [f"{self.error}; the results up to there are kept"] if self.error else []
         return lines + ([f"no pictures: {self.manifest['pictures']}"] if self.manifest.get("pictures") else [])
+
+    def _missed(self, name: str) -> str:
+        """Say which part of an error makes it miss its tolerance, and what helps."""
+        parts = self.error_parts[name]
+        cure = CURES[parts.largest].format(macro_step=0.5 * self.macro_step)
+        return f"{name}: the estimated error misses its tolerance, most of it is {NAMES[parts.largest]}: {cure}"
 
     def _unconverged(self) -> str:
         """Say how many macro steps did not converge, where, and what helps."""

@@ -41,6 +41,7 @@ def summary(coupled: Coupled) -> dict[str, Any]:
         "title": scenario.title,
         "verdict": verdict(coupled),
         "notes": scenario.notes,
+        "warnings": coupled.system.warnings(coupled.table),
         **about,
         "master": coupled.master,
         "exchange": coupled.exchange or None,
@@ -53,7 +54,7 @@ def summary(coupled: Coupled) -> dict[str, Any]:
         "energy_residual_J": {name: float(np.max(np.abs(r))) for name, r in log.energy_residual.items()},
         "tolerances": scenario.simulation.tolerances,
         "estimate": scenario.simulation.estimate,
-        "estimated_error": coupled.estimated_error,
+        "estimated_error": {name: parts.content() for name, parts in coupled.error_parts.items()},
         "estimate_failure": coupled.estimate_failure,
         "interface_balance": interface_balance(coupled.table, log.energy),
         "units": {"time": "s"} | {name: log.units[name] for name in coupled.table if name in log.units},
@@ -65,7 +66,7 @@ def verdict(coupled: Coupled) -> Verdict:
     """Return how a run ended; what it means stands at `Run.verdict`."""
     if coupled.log.error is not None:
         return "interrupted" if isinstance(coupled.log.error, Interruption) else "failed"
-    return "missed" if coupled.log.unconverged or coupled.fallen else "within"
+    return "missed" if coupled.log.unconverged or coupled.fallen or coupled.misses else "within"
 
 
 def _cost(coupled: Coupled) -> dict[str, Any]:

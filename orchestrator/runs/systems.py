@@ -9,9 +9,18 @@ from typing import TYPE_CHECKING, Any, Protocol, TypeVar
 
 import numpy as np
 
+from fmus.cable.mesh import TOLERANCE
 from orchestrator.catalogue import library
 from orchestrator.catalogue import modules as vocabulary
-from orchestrator.coupling.exchange import PARAMETER, Choice, exchange_named, is_companion, is_rate_of_motion, suited_to
+from orchestrator.coupling.exchange import (
+    EXCHANGES,
+    PARAMETER,
+    Choice,
+    exchange_named,
+    is_companion,
+    is_rate_of_motion,
+    suited_to,
+)
 from orchestrator.coupling.fmu.instance import Fmu
 from orchestrator.coupling.fmu.sub_steps import instance
 from orchestrator.coupling.graph.graph import Graph
@@ -21,9 +30,9 @@ from orchestrator.coupling.run.results import Table
 from orchestrator.landing import audit
 from orchestrator.landing.build import has_monolithic, problem
 from orchestrator.landing.fields import cable_fields
-from orchestrator.landing.resolve import Landing, Variables
+from orchestrator.landing.resolve import MESH_KEYS, MESH_TOLERANCE, Landing, Variables
 from orchestrator.landing.resolve import resolve as resolve_landing
-from orchestrator.landing.wiring import landing_graph
+from orchestrator.landing.wiring import inner_step, landing_graph
 from orchestrator.scenario.types import CableSection, Component, GraphScenario, LandingScenario, RobotSection, Scenario
 
 if TYPE_CHECKING:
@@ -32,6 +41,27 @@ if TYPE_CHECKING:
 INNER_STEP = "integration_step"
 Fields = dict[str, np.ndarray]
 Stepped = TypeVar("Stepped", CableSection, RobotSection, Component)
+
+
+MESH_RATIO = 1.5
+"""Number of elements of a finer mesh over that of the run's."""
+MESH_ORDER = 3
+"""Order of the error in the element length that is reckoned with: 4 where the motion is smooth, less where an impact makes
+waves shorter than the elements."""
+
+
+@dataclass(frozen=True)
+class Meshed:
+    """A system with a finer mesh.
+
+    Attributes
+    ----------
+    ratio : length of the run's elements over that of the finer ones; infinite where the run's mesh does not fit the landing
+        and one that does is in its place: the difference is then the error
+    """
+
+    system: System
+    ratio: float
 
 
 class System(Protocol):
@@ -63,12 +93,20 @@ class System(Protocol):
         """Return what ``summary.json`` says of this kind of system alone."""
         ...
 
+    def warnings(self, table: Table) -> list[str]:
+        """Return what makes the results of a run doubtful, a line each."""
+        ...
+
     def changed(self, options: Mapping[str, Any], **simulation: Any) -> System:
         """Return it with other options of the master and other simulation settings (macro_step, …)."""
         ...
 
     def stepped(self, ratio: float) -> System:
-        """Return it with the inner steps of all components that have them `ratio` times as long."""
+        """Return it with the inner steps of all components that have them `ratio` times as long, whatever the macro step."""
+        ...
+
+    def meshed(self, ratio: float = MESH_RATIO) -> Meshed | None:
+        """Return it with a finer mesh; None where there is no mesh, or it is that of a foreign FMU."""
         ...
 
 
@@ -105,19 +143,44 @@ class LandingSystem:
         """Return stiffness set and robot, and which signals an energy audit would need."""
         robot = self.scenario.robot
         energy = {"verdict": None, "missing": audit.missing(table)}
-        return {"stiffness_set": self.scenario.cable.stiffness_set, "robot": robot.model or robot.fmu, "energy": energy}
+        mesh = self.landing.mesh.content() if self.landing.mesh is not None else None
+        set_name = self.scenario.cable.stiffness_set
+        return {"stiffness_set": set_name, "robot": robot.model or robot.fmu, "mesh": mesh, "energy": energy}
+
+    def warnings(self, table: Table) -> list[str]:
+        """Return which wheels are where the mesh does not resolve what they do, a line each."""
+        if self.landing.mesh is None:
+            return []
+        arcs = (f"contact{k}.cable.s" for k in range(1, self.landing.n_wheels + 1))
+        return list(self.landing.mesh.notes(table[name] for name in arcs if name in table))
 
     def changed(self, options: Mapping[str, Any], **simulation: Any) -> LandingSystem:
         """Return it with other options of the master and other simulation settings; the start stays as it is."""
         return LandingSystem(self.landing.changed(self.scenario.changed(dict(options), **simulation)))
 
     def stepped(self, ratio: float) -> LandingSystem:
-        """Return it with other inner steps; those of our cable follow the macro step where the scenario gives none."""
+        """Return it with other inner steps, whatever the macro step."""
         known, cable, robot = self.landing.sources.variables, self.scenario.cable, self.scenario.robot
-        if cable.fmu is not None or INNER_STEP in cable.parameters:
-            cable = _scaled(cable, known["cable"], ratio)
-        sections = {"cable": cable, "robot": _scaled(robot, known["robot"], ratio)}
+        if cable.fmu is None and INNER_STEP not in cable.parameters:
+            step = inner_step(self.landing, EXCHANGES[self.exchange])
+            cable = cable.model_copy(update={"parameters": cable.parameters | {INNER_STEP: step}})
+        sections = {"cable": _scaled(cable, known["cable"], ratio), "robot": _scaled(robot, known["robot"], ratio)}
         return LandingSystem(self.landing.changed(self.scenario.model_copy(update=sections)))
+
+    def meshed(self, ratio: float = MESH_RATIO) -> Meshed | None:
+        """Return it with a finer mesh; None where the cable is a foreign one."""
+        cable, mesh = self.scenario.cable, self.landing.mesh
+        if mesh is None:
+            return None
+        given = set(MESH_KEYS) & set(cable.parameters)
+        change = {MESH_TOLERANCE: float(self.landing.cable.module.get(MESH_TOLERANCE, TOLERANCE)) / ratio**4}
+        if given and not mesh.is_coarse:
+            given, change = set(), {"n_elements": round(ratio * mesh.n_elements)}
+        kept = {name: value for name, value in cable.parameters.items() if name not in given}
+        section = cable.model_copy(update={"parameters": kept | change})
+        finer = self.landing.meshed(self.scenario.model_copy(update={"cable": section}))
+        assert finer.mesh is not None
+        return Meshed(LandingSystem(finer), np.inf if given else finer.mesh.n_elements / mesh.n_elements)
 
 
 @dataclass(frozen=True)
@@ -160,11 +223,18 @@ class GraphSystem:
 
     def about(self, table: Table) -> dict[str, Any]:
         """Return nothing that only a landing has."""
-        return {"stiffness_set": None, "robot": None, "energy": {}}
+        return {"stiffness_set": None, "robot": None, "mesh": None, "energy": {}}
+
+    def warnings(self, table: Table) -> list[str]:
+        """Return nothing: what a run of a general graph should not do is not known."""
+        return []
 
     def changed(self, options: Mapping[str, Any], **simulation: Any) -> GraphSystem:
         """Return it with other options of the master and other simulation settings."""
         return replace(self, scenario=self.scenario.changed(dict(options), **simulation))
+
+    def meshed(self, ratio: float = MESH_RATIO) -> None:
+        """Return None: nothing is known of the mesh of a component."""
 
     def stepped(self, ratio: float) -> GraphSystem:
         """Return it with other inner steps."""

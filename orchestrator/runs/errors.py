@@ -1,0 +1,100 @@
+"""The parts of an error, estimated or measured."""
+
+from __future__ import annotations
+
+import re
+from collections.abc import Iterable, Mapping
+from dataclasses import asdict, dataclass
+from typing import Any
+
+import numpy as np
+
+from orchestrator.coupling.run.compare import matching_rows
+from orchestrator.coupling.run.results import Table
+
+CONSTANT = 1e-6
+"""A signal that moves by less than this (m, rad …) counts as constant: errors are then held against this range, as for
+the roll of a landing at midspan, which is zero by symmetry."""
+PEAK = re.compile(r"contact\d+\.normal_force_max")
+"""Signals whose largest value over the run has an error of its own; elsewhere it is the largest difference over time."""
+
+Differences = dict[str, float]
+"""Signal → largest difference, in its unit."""
+NAMES = {"coupling": "coupling and macro step", "inner_steps": "inner steps", "mesh": "mesh"}
+"""Part → what it is called where people read it."""
+CURES = {
+    "coupling": "take a smaller macro step (--macro-step {macro_step:g})",
+    "inner_steps": "take shorter inner steps (integration_step of cable or robot)",
+    "mesh": "lower cable.parameters.mesh_tolerance (without n_elements and grading, which give a mesh of your own)",
+}
+"""Part → what makes it smaller."""
+
+
+@dataclass(frozen=True)
+class Parts:
+    """Error of a signal, largest over the run, in its unit; of a peak force that of its largest value.
+
+    Attributes
+    ----------
+    coupling : of the exchange at macro steps, and of the iteration
+    inner_steps : of the steps that components make inside a macro step; None where it is part of `coupling`, or there are none
+    mesh : of the cable's mesh; None where there is none, or that of a foreign cable
+    total : their sum, an estimate; or the whole difference from a reference on a finer mesh; NaN where a part is not known
+    """
+
+    coupling: float | None
+    inner_steps: float | None
+    mesh: float | None
+    total: float
+
+    @property
+    def covered(self) -> list[str]:
+        """What the total covers, in words."""
+        return [words for part, words in NAMES.items() if getattr(self, part) is not None]
+
+    @property
+    def largest(self) -> str:
+        """The part that is most of the total."""
+        known = {part: getattr(self, part) for part in NAMES}
+        return max((part for part, value in known.items() if value is not None), key=lambda part: known[part])
+
+    def content(self) -> dict[str, Any]:
+        """Return what is written of it."""
+        return asdict(self)
+
+    @classmethod
+    def from_content(cls, content: Mapping[str, float | None]) -> Parts:
+        """Return what was written; JSON has no NaN, and says null."""
+        total = content["total"]
+        nan = float("nan")
+        values = {p: nan if content[p] is None and total is None else content[p] for p in NAMES}
+        return cls(**values, total=nan if total is None else total)
+
+
+def range_of(values: np.ndarray) -> float:
+    """Return the peak-to-peak of a signal, in its unit, or that of one that counts as constant."""
+    return max(float(np.ptp(values)), CONSTANT)
+
+
+def missed(parts: Mapping[str, Parts], tolerances: Mapping[str, float], table: Mapping[str, np.ndarray]) -> list[str]:
+    """Return the signals whose error is larger than their tolerance allows."""
+    judged = [name for name in tolerances if name in parts and name in table]
+    return [name for name in judged if parts[name].total > tolerances[name] * range_of(table[name])]
+
+
+def judged(table: Table, tolerances: Iterable[str]) -> list[str]:
+    """Return the signals whose error is estimated: those with a tolerance, and the peak forces of all contacts."""
+    return [name for name in dict.fromkeys([*tolerances, *filter(PEAK.fullmatch, table)]) if name in table]
+
+
+def differences(table: Table, other: Table, names: Iterable[str]) -> Differences:
+    """Return the largest difference by signal at the times that both tables have; of a peak that of the largest values."""
+    coarse, fine = sorted((table, other), key=lambda t: len(t["time"]))
+    rows = matching_rows(fine["time"], coarse["time"])
+    return {name: _difference(coarse[name], fine[name], rows, name) for name in names if name in other}
+
+
+def _difference(coarse: np.ndarray, fine: np.ndarray, rows: np.ndarray, name: str) -> float:
+    if PEAK.fullmatch(name):
+        return float(abs(np.max(coarse) - np.max(fine)))
+    return float(np.max(np.abs(coarse - fine[rows])))
