@@ -12,6 +12,7 @@ import pytest
 from scipy.integrate import solve_ivp
 
 from fmus.cable.assembly import add_inertia, constrain_vector, element_work, internal_force
+from fmus.cable.mesh import nodes
 from fmus.cable.statics import mesh_model
 
 exudyn = pytest.importorskip("exudyn", reason="Exudyn is not installed: pip install -e '.[crosscheck]'")
@@ -23,8 +24,7 @@ N_ELEMENTS, STOP = 10, 0.4
 def ours(mass, times):
     """Height of the mass (m) over time with our element, integrated by SciPy's Radau."""
     model = mesh_model(
-        span=LENGTH, level_difference=0.0, unstretched_length=LENGTH, n_elements=N_ELEMENTS, grading=1.0,
-        grading_position=-1.0, ea=EA, ei=EI, damping=DAMPING, density=DENSITY, gravity=GRAVITY, clamped=False,
+        nodes(LENGTH, N_ELEMENTS), span=LENGTH, level_difference=0.0, ea=EA, ei=EI, damping=DAMPING, density=DENSITY, gravity=GRAVITY, clamped=False,
     )  # fmt: skip
     n, work, axial = model.weight.size, element_work(), np.zeros(N_ELEMENTS)
     middle = 6 * (N_ELEMENTS // 2)

@@ -226,7 +226,7 @@ class Cable:
         """Return the arc lengths of the nodes (n_elements + 1,) of the cable of the given unstretched length."""
         if self["n_elements"] >= 1.0:
             return nodes(length, int(self["n_elements"]), self["grading"], self["grading_position"])
-        if self["grading"] > 1.0:
+        if self["grading"] > 1.0 or self["grading_position"] >= 0.0:
             raise ModuleError(
                 "cable: grading: needs n_elements; without any of n_elements, grading and grading_position the mesh is "
                 "found by itself"

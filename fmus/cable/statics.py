@@ -38,8 +38,10 @@ def mesh_model(
 
     The left support is the origin, the right one (0, span, level_difference).
     """
-    weight = np.zeros(6 * s.size)
     l = np.diff(s)
+    if l.size == 0 or np.min(l) <= 0.0:
+        raise ValueError("a cable needs two nodes at least, at rising arc lengths")
+    weight = np.zeros(6 * s.size)
     for offset, share in ((2, l / 2), (5, l**2 / 12), (8, l / 2), (11, -(l**2) / 12)):
         np.add.at(weight, 6 * np.arange(l.size) + offset, -density * gravity * share)
     chord = np.array([0.0, span, level_difference]) / np.hypot(span, level_difference)

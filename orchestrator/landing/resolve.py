@@ -200,7 +200,7 @@ def _mesh(scenario: LandingScenario, sources: Sources) -> dict[str, Value]:
     Half of the smallest tolerance is left to the mesh, and never more than what it leaves by default.
     """
     known, robot = sources.variables["cable"], robot_module(_robot(scenario, sources), sources.n_wheels)
-    if set(MESH_KEYS) & set(scenario.cable.parameters) or "landing_load" not in known:
+    if any(float(scenario.cable.parameters.get(name, 0)) > 0.0 for name in MESH_KEYS) or "landing_load" not in known:
         return {}
     wheels = scenario.landing.position + wheels_along(robot)
     tolerance = min([TOLERANCE, *(FOR_THE_MESH * allowed for allowed in scenario.simulation.tolerances.values())])

@@ -5,6 +5,7 @@ from __future__ import annotations
 import numpy as np
 
 from fmus.cable.assembly import Model, add_load, interpolate
+from fmus.cable.mesh import nodes
 from fmus.cable.module import Cable
 from fmus.cable.statics import equilibrium, mesh_model
 from fmus.module.variables import Value
@@ -26,14 +27,15 @@ RIG: Settings = {
     "bending_stiffness": 337.8,
     "linear_density": 0.707,
 }
+TWENTY: Settings = {"n_elements": 20}
 ROBOT_WEIGHT = 38.0 * 9.8
 """N; a dead load of the robot's mass."""
 
 
 def cable(*settings: Settings, **more: Value) -> Cable:
-    """Return an initialised cable."""
+    """Return an initialised cable; of 20 equal elements if nothing else is said."""
     made = Cable()
-    for group in (*settings, more):
+    for group in (TWENTY, *settings, more):
         made.table.assign(made.values, group)
     made.initialize(0.0)
     return made
@@ -58,12 +60,9 @@ def loaded_equilibrium(
     """Return the meshed cable and its equilibrium under gravity and dead loads (arc length m, force down N)."""
     span = float(settings["span"])
     model = mesh_model(
+        nodes(float(settings["unstretched_length"]), n_elements, grading, grading_position),
         span=span,
         level_difference=level_difference,
-        unstretched_length=float(settings["unstretched_length"]),
-        n_elements=n_elements,
-        grading=grading,
-        grading_position=grading_position,
         ea=float(settings["axial_stiffness"]),
         ei=float(settings["bending_stiffness"]),
         damping=0.0,
