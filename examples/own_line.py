@@ -11,7 +11,6 @@ title = "A span of 120 m with 3 m of sag, landing at its middle"
 [cable.parameters]
 span = { value = 120.0, unit = "m", source = "survey" }
 sag = { value = 300.0, unit = "cm", source = "survey, at 15 °C" }
-grading_position = { value = 60.0, unit = "m", source = "assumed", reason = "where the wheel lands" }
 
 [landing]
 position = { value = 60.0, unit = "m", source = "planned" }

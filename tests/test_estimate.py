@@ -149,7 +149,9 @@ def test_estimate_of_the_oscillator_is_within_a_factor_three(kind, master, H):
     for name, values in exact.items():
         error = np.max(np.abs(coupled.table[name] - values))
         assert 1 / 3 < coupled.estimated_error[name] / error < 3
-    assert summary(coupled)["estimated_error"] == coupled.estimated_error
+    written = summary(coupled)["estimated_error"]
+    assert {name: parts["total"] for name, parts in written.items()} == coupled.estimated_error
+    assert all(parts["coupling"] == parts["total"] for parts in written.values()), "no inner steps, no mesh"
 
 
 def landing(*settings: str, stop: float = 0.055) -> LandingSystem:
@@ -169,17 +171,20 @@ def resolved(scenario: Scenario) -> LandingSystem:
     return LandingSystem(flagship().changed(scenario))
 
 
-@pytest.mark.parametrize(("kind", "ratio", "stop"), [("finer", 0.5, 0.055), ("coarser", 2.0, 0.05)])
-def test_steps_and_tolerances_change_together(kind, ratio, stop):
-    """Eleven macro steps: one is left over where they are doubled. The robot's inner step is its table's default."""
+@pytest.mark.parametrize(("kind", "ratio", "inner", "stop"), [("finer", 0.5, 1.0, 0.055), ("coarser", 2.0, 2.0, 0.05)])
+def test_steps_and_tolerances_change_together(kind, ratio, inner, stop):
+    """Eleven macro steps: one is left over where they are doubled. The robot's inner step is its table's default.
+
+    A finer run keeps the inner steps, which are a part of their own; in a coarser one they are doubled as well.
+    """
     system = landing(f"simulation.estimate={kind}", "master.local_tolerance=1e-6")
     again = estimate.second(system)
     assert isinstance(again, LandingSystem)
     other = again.scenario
     assert other.simulation.macro_step == 0.005 * ratio and other.simulation.stop_time == pytest.approx(stop)
-    assert "integration_step" not in again.landing.cable.settings  # it follows the macro step
+    assert again.landing.cable.settings["integration_step"] == inner * 0.005 / 4  # what it is in the run
     assert (
-        again.landing.robot.settings["integration_step"] == other.robot.parameters["integration_step"] == 0.001 * ratio
+        again.landing.robot.settings["integration_step"] == other.robot.parameters["integration_step"] == 0.001 * inner
     )
     changes = {name: change if ratio > 1 else 1 / change for name, change in estimate.TOLERANCES.items()}
     before = {"tolerance": 1e-6, "local_tolerance": 1e-6}
@@ -187,9 +192,11 @@ def test_steps_and_tolerances_change_together(kind, ratio, stop):
     assert "integration_step" not in system.scenario.robot.parameters
 
 
-def test_an_inner_step_of_the_scenario_is_halved():
-    again = estimate.second(landing("cable.parameters.integration_step=0.002"))
-    assert isinstance(again, LandingSystem) and again.landing.cable.settings["integration_step"] == 0.001
+def test_an_inner_step_of_the_scenario_is_kept_then_halved():
+    system = landing("cable.parameters.integration_step=0.002")
+    again, inner = estimate.second(system), system.stepped(0.5)
+    assert isinstance(again, LandingSystem) and again.landing.cable.settings["integration_step"] == 0.002
+    assert inner.landing.cable.settings["integration_step"] == 0.001 and inner.scenario.simulation.macro_step == 0.005
 
 
 @pytest.mark.parametrize(
@@ -229,8 +236,8 @@ def test_no_estimate_where_none_is_asked_for():
 
 def test_ctrl_c_in_the_second_run_leaves_the_first():
     coupled = finished()
-    estimate_error(coupled, lambda time: signal.raise_signal(signal.SIGINT) if time > 0.031 else None)
-    assert coupled.estimate_failure == "interrupted at t = 0.035 s"
+    estimate_error(coupled, lambda _: lambda time: signal.raise_signal(signal.SIGINT) if time > 0.031 else None)
+    assert coupled.estimate_failure == "coupling and macro step: interrupted at t = 0.035 s"
     assert coupled.log.error is None and np.isnan(list(coupled.estimated_error.values())).all()
 
 

@@ -24,7 +24,8 @@ N_ELEMENTS, STOP = 10, 0.4
 def ours(mass, times):
     """Height of the mass (m) over time with our element, integrated by SciPy's Radau."""
     model = mesh_model(
-        nodes(LENGTH, N_ELEMENTS), span=LENGTH, level_difference=0.0, ea=EA, ei=EI, damping=DAMPING, density=DENSITY, gravity=GRAVITY, clamped=False,
+        nodes(LENGTH, N_ELEMENTS), span=LENGTH, level_difference=0.0, ea=EA,
+        ei=EI, damping=DAMPING, density=DENSITY, gravity=GRAVITY, clamped=False,
     )  # fmt: skip
     n, work, axial = model.weight.size, element_work(), np.zeros(N_ELEMENTS)
     middle = 6 * (N_ELEMENTS // 2)

@@ -78,7 +78,7 @@ _PARAMETERS = [
         "grading_position",
         "m",
         -1.0,
-        "arc length of a refined point besides the supports; negative: none",
+        "arc length of a refined point besides the supports (and where wheels land); negative: none",
     ),
     parameter("axial_stiffness", "N", 8.12e7, "EA", POSITIVE),
     parameter("bending_stiffness", "N.m2", 6580.0, "EI", NON_NEGATIVE),
@@ -226,11 +226,8 @@ class Cable:
         """Return the arc lengths of the nodes (n_elements + 1,) of the cable of the given unstretched length."""
         if self["n_elements"] >= 1.0:
             return nodes(length, int(self["n_elements"]), self["grading"], self["grading_position"])
-        if self["grading"] > 1.0 or self["grading_position"] >= 0.0:
-            raise ModuleError(
-                "cable: grading: needs n_elements; without any of n_elements, grading and grading_position the mesh is "
-                "found by itself"
-            )
+        if self["grading"] > 1.0:
+            raise ModuleError("cable: grading: needs n_elements; without both the mesh is found by itself")
         return automatic(self._line(length), self._landing_arcs(length), self["landing_load"], self["mesh_tolerance"])
 
     @property
@@ -244,11 +241,12 @@ class Cable:
         return Line(self["span"], self["level_difference"], length, ea, ei, weight, bool(self["clamped"]))
 
     def _landing_arcs(self, length: float) -> np.ndarray:
-        """Return the arc lengths (m) at which wheels land, on the catenary of the given unstretched length."""
+        """Return the arc lengths (m) at which wheels land, on the catenary, and of the refined point besides."""
         wanted = np.array([self[f"landing[{k + 1}].position"] for k in range(N_PORTS)])
         model = self._model(np.linspace(0.0, length, N_CATENARY))
         y = catenary(model, self["span"], self["level_difference"])[1::6]
-        return np.interp(wanted[wanted >= 0.0], y, model.s)
+        besides = self["grading_position"]
+        return np.append(np.interp(wanted[wanted >= 0.0], y, model.s), [besides] if besides >= 0.0 else [])
 
     def _length_for_sag(self) -> float:
         """Return the unstretched length with which the equilibrium has the sag wanted."""

@@ -31,7 +31,7 @@ MESH_TOLERANCE = "mesh_tolerance"
 FOR_THE_MESH = 0.5
 """Part of a tolerance that is left to the mesh."""
 MESH_KEYS = ("n_elements", "grading", "grading_position")
-"""Parameters of the cable that give its mesh; without any of them it is found from where the wheels land."""
+"""Parameters of the cable that give its mesh; without n_elements it is found from where the wheels land."""
 
 
 @dataclass(frozen=True)
@@ -200,7 +200,7 @@ def _mesh(scenario: LandingScenario, sources: Sources) -> dict[str, Value]:
     Half of the smallest tolerance is left to the mesh, and never more than what it leaves by default.
     """
     known, robot = sources.variables["cable"], robot_module(_robot(scenario, sources), sources.n_wheels)
-    if any(float(scenario.cable.parameters.get(name, 0)) > 0.0 for name in MESH_KEYS) or "landing_load" not in known:
+    if scenario.cable.parameters.get("n_elements", 0) or "landing_load" not in known:
         return {}
     wheels = scenario.landing.position + wheels_along(robot)
     tolerance = min([TOLERANCE, *(FOR_THE_MESH * allowed for allowed in scenario.simulation.tolerances.values())])

@@ -18,7 +18,6 @@ from orchestrator.coupling.run.results import Table
 from orchestrator.landing.audit import Audit, of_monolithic
 from orchestrator.runs.errors import CONSTANT, Parts, differences, judged
 from orchestrator.runs.result import EXIT_STATUS, Run, Verdict, pandas_module, run_label
-from orchestrator.runs.systems import MESH_ORDER
 
 REFERENCE_MARGIN = 0.1
 """The reference's own error may be this part of a tolerance, or the verdict means nothing."""
@@ -33,7 +32,7 @@ class Reference:
     kind : how it was made, in words
     table : its signals at all communication points of all runs
     wall_s : s
-    estimated_error : its own error by signal, in the signal's unit
+    estimated_error : its own error by signal, in the signal's unit; of the signals judged with what the finer mesh leaves
     fields : arrays over time, as in ``fields.h5``
     finer : the signals on a mesh `mesh_ratio` times as fine as the runs'; None where no mesh is judged
     """
@@ -46,20 +45,13 @@ class Reference:
     finer: Table | None = None
     mesh_ratio: float = float("nan")
 
-    def own_error(self, name: str, mesh: float | None) -> float | None:
-        """Return its own error of a signal, in its unit: estimated, with what the finer mesh leaves of the error `mesh`."""
-        known = self.estimated_error.get(name)
-        if known is None or mesh is None or not np.isfinite(self.mesh_ratio):
-            return known
-        return known + mesh * self.mesh_ratio**-MESH_ORDER
-
     def parts(self, table: Table, names: Iterable[str]) -> dict[str, Parts]:
         """Return the errors of a run's signals by their parts; that of the inner steps is in that of the coupling."""
         names = [name for name in names if name in self.table]
         coupling = differences(table, self.table, names)
         if self.finer is None:
             return {name: Parts(error, None, None, error) for name, error in coupling.items()}
-        by = 1.0 / (1.0 - self.mesh_ratio**-MESH_ORDER)
+        by = left_out(self.mesh_ratio)
         mesh, total = differences(self.table, self.finer, names), differences(table, self.finer, names)
         return {name: Parts(coupling[name], None, by * mesh[name], total[name]) for name in names}
 
@@ -80,7 +72,7 @@ class RunErrors:
     cable_steps: int
     wall_s: float
     signals: dict[str, SignalError]
-    errors: dict[str, Parts]
+    errors: dict[str, Parts] = field(default_factory=dict)
 
     @property
     def label(self) -> str:
@@ -171,7 +163,6 @@ class Comparison:
                 "kind": reference.kind,
                 "wall_s": reference.wall_s,
                 "estimated_error": reference.estimated_error,
-                "mesh_ratio": reference.mesh_ratio if reference.finer is not None else None,
             },
             "runs": self.runs,
             "observed_order": self.observed_order,
@@ -197,13 +188,12 @@ class Comparison:
         """Return the comparison that ``comparison.json`` and ``reference.csv`` hold."""
         known = content["reference"]
         reference = Reference(known["kind"], table, known["wall_s"], _numbers(known["estimated_error"], "nan"))
-        reference.mesh_ratio = _numbers({"": known["mesh_ratio"]})[""]
         return cls(reference, [_run_errors(run) for run in content["runs"]], content["tolerance"])
 
 
 def _run_errors(content: Mapping[str, Any]) -> RunErrors:
     signals = {name: SignalError(**_numbers(error)) for name, error in content["signals"].items()}
-    errors = {name: Parts.from_content(parts) for name, parts in content["errors"].items()}
+    errors = {name: Parts.from_content(parts) for name, parts in content.get("errors", {}).items()}
     return RunErrors(**{**content, "signals": signals, "errors": errors})
 
 
@@ -213,12 +203,13 @@ def _numbers(values: Mapping[str, float | None], null: str = "inf") -> dict[str,
 
 
 def _check(run: RunErrors, signal: str, tolerance: float, reference: Reference) -> Check:
-    parts, error = run.errors.get(signal), run.signals.get(signal)
-    if error is None or parts is None:
+    error = run.signals.get(signal)
+    if error is None:
         note = "not among the signals of run and reference"
         return Check(run.master, run.macro_step, signal, float("nan"), tolerance, False, note)
+    parts = run.errors.get(signal) or Parts(error.max_error, None, None, error.max_error)
     scale = max(error.scale, CONSTANT)
-    value, own, note = parts.total / scale, reference.own_error(signal, parts.mesh), ""
+    value, own, note = parts.total / scale, reference.estimated_error.get(signal), ""
     if own is None:
         note = "the reference does not say how accurate it is"
     elif not own <= REFERENCE_MARGIN * tolerance * scale:

@@ -12,7 +12,7 @@ from orchestrator.coupling.errors import InputError, RunError
 from orchestrator.coupling.fmu.failure import FmuError
 from orchestrator.coupling.graph.graph import Graph
 from orchestrator.coupling.masters import StepReport
-from orchestrator.coupling.run.interrupt import interruptible
+from orchestrator.coupling.run.interrupt import Interruption, interruptible
 from orchestrator.coupling.run.log import Log
 from orchestrator.coupling.run.results import Table
 from orchestrator.coupling.run.simulate import simulate
@@ -30,6 +30,10 @@ OF_A_STEP = (
 """What is kept of the report of a macro step."""
 Reached = Callable[[float], None]
 """Told the time (s) that a run has come to."""
+
+
+class Interrupted(RunError):
+    """Ctrl-C in a run that serves another one."""
 
 
 @dataclass
@@ -128,12 +132,14 @@ def _simulated(scenario: Scenario, graph: Graph, progress: Reached) -> Log:
 
 
 def completed(system: System, progress: Reached) -> Coupled:
-    """Run a system coupled to its end; `RunError` if it does not come there."""
+    """Run a system coupled to its end; `RunError` if it does not come there, `Interrupted` after Ctrl-C."""
     try:
         coupled = run_coupled(system, progress)
     except InputError as error:  # an FMU that cannot be stepped so finely
         step = system.scenario.simulation.macro_step
         raise RunError(f"no run with a macro step of {step:g} s: {error}") from None
+    if isinstance(coupled.log.error, Interruption):
+        raise Interrupted(str(coupled.log.error), coupled.log.error.time)
     if coupled.log.error is not None:
         raise RunError(str(coupled.log.error), coupled.log.error.time)
     return coupled

@@ -13,7 +13,7 @@ steps and mesh (docs/concepts/error.md).
 
 from __future__ import annotations
 
-from collections.abc import Callable
+from collections.abc import Callable, Sequence
 from typing import Any
 
 import numpy as np
@@ -23,10 +23,11 @@ from orchestrator.coupling.errors import OrchestratorError, RunError
 from orchestrator.coupling.exchange import EXPLICIT_ORDER, exchange_named
 from orchestrator.coupling.masters import MASTERS
 from orchestrator.coupling.masters.options import master_options
+from orchestrator.coupling.run.interrupt import Interruption, interruptible
 from orchestrator.coupling.run.results import Table
-from orchestrator.runs.coupled import Coupled, Reached, completed
+from orchestrator.runs.coupled import Coupled, Interrupted, Reached, completed
 from orchestrator.runs.errors import NAMES, Differences, Parts, differences, judged
-from orchestrator.runs.systems import MESH_ORDER, System
+from orchestrator.runs.systems import System, left_out
 from orchestrator.scenario.types import Scenario
 
 RATIOS = {"finer": 0.5, "coarser": 2.0}
@@ -96,23 +97,31 @@ def estimate_error(coupled: Coupled, told: Told = lambda _: lambda _: None) -> C
         "inner_steps": lambda: _of_inner_steps(coupled, told("inner steps")),
         "mesh": lambda: _of_mesh(coupled, told("mesh")),
     }
-    found = {part: _attempted(coupled, part, make) for part, make in wanted.items()}
-    coupled.error_parts = {name: _parts({p: d and d.get(name) for p, d in found.items()}) for name in signals}
+    found: dict[str, Differences | None] = {}
+    for part, make in wanted.items():
+        found[part], goes_on = _attempted(coupled, part, make)
+        if not goes_on:
+            break
+    coupled.error_parts = {name: _parts([(found.get(p) or {}).get(name) for p in wanted]) for name in signals}
     return others[0] if others else None
 
 
-def _attempted(coupled: Coupled, part: str, make: Callable[[], Differences | None]) -> Differences | None:
-    """Return the errors of a part by signal; NaN where its run failed, which is noted, None where there is no such part."""
+def _attempted(coupled: Coupled, part: str, make: Callable[[], Differences | None]) -> tuple[Differences | None, bool]:
+    """Return the errors of a part by signal, and whether to go on with others: not after Ctrl-C.
+
+    They are NaN where its run failed, which is noted; None where there is no such part.
+    """
     try:
-        return make()
+        return make(), True
     except (OrchestratorError, ModuleError) as error:
         coupled.estimate_failure += f"{'; ' if coupled.estimate_failure else ''}{NAMES[part]}: {error}"
-        return dict.fromkeys(judged(coupled.table, coupled.scenario.simulation.tolerances), float("nan"))
+        unknown = dict.fromkeys(judged(coupled.table, coupled.scenario.simulation.tolerances), float("nan"))
+        return unknown, not isinstance(error, Interrupted)
 
 
-def _parts(values: dict[str, float | None]) -> Parts:
-    known = [value for value in values.values() if value is not None]
-    return Parts(**values, total=float(np.sum(known)))
+def _parts(values: Sequence[float | None]) -> Parts:
+    """Return the error of a signal from its parts, in the order of their names."""
+    return Parts(*values, total=float(np.sum([value for value in values if value is not None])))
 
 
 # -- the parts ------------------------------------------------------------------------------------------------
@@ -138,7 +147,7 @@ def _of_mesh(coupled: Coupled, progress: Reached) -> Differences | None:
     finer = system.meshed()
     if finer is None:
         return None
-    by = 1.0 / (1.0 - finer.ratio**-MESH_ORDER) if np.isfinite(finer.ratio) else 1.0
+    by = left_out(finer.ratio)
     if system.problem() is None or finer.system.problem() is None:
         return _scaled(coupled, completed(finer.system, progress).table, by)
     tables = [solved(one, coupled.table["time"], progress) for one in (system, finer.system)]
@@ -153,10 +162,21 @@ def solved(system: System, times: np.ndarray, progress: Reached, tolerance: floa
     problem = system.problem()
     assert problem is not None
     try:
-        found = monolithic.solve(problem, times, tolerance, estimate=False, progress=progress)
+        with interruptible() as check:
+            found = monolithic.solve(problem, times, tolerance, estimate=False, progress=_both(progress, check))
+    except Interruption as error:
+        raise Interrupted(str(error), error.time) from None
     except ModuleError as error:
         raise RunError(str(error)) from None
     return {"time": found.time, **found.signals}
+
+
+def _both(first: Reached, second: Reached) -> Reached:
+    def told(time: float) -> None:
+        first(time)
+        second(time)
+
+    return told
 
 
 def _scaled(coupled: Coupled, other: Table, by: float) -> Differences:

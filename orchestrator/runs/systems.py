@@ -64,6 +64,11 @@ class Meshed:
     ratio: float
 
 
+def left_out(ratio: float) -> float:
+    """Return what the difference from a mesh `ratio` times as fine is multiplied by to have the error of the coarser one."""
+    return 1.0 / (1.0 - ratio**-MESH_ORDER)
+
+
 class System(Protocol):
     """A scenario resolved."""
 
@@ -172,7 +177,7 @@ class LandingSystem:
         cable, mesh = self.scenario.cable, self.landing.mesh
         if mesh is None:
             return None
-        given = set(MESH_KEYS) & set(cable.parameters)
+        given = set(MESH_KEYS) & set(cable.parameters) if cable.parameters.get("n_elements", 0) else set()
         change = {MESH_TOLERANCE: float(self.landing.cable.module.get(MESH_TOLERANCE, TOLERANCE)) / ratio**4}
         if given and not mesh.is_coarse:
             given, change = set(), {"n_elements": round(ratio * mesh.n_elements)}
