@@ -235,6 +235,6 @@ def test_comparison_json_has_the_agreed_keys_and_reads_back(directory: RunDirect
     assert set(content) == {"reference", "runs", "observed_order", "tolerance", "verdict"}
     assert set(content["reference"]) == {"kind", "wall_s", "estimated_error"}
     keys = {"master", "macro_step", "steps", "iterations_per_step", "unconverged_steps", "cable_steps", "wall_s"}
-    assert set(content["runs"][0]) == keys | {"signals"}
+    assert set(content["runs"][0]) == keys | {"signals", "errors"}
     assert set(content["runs"][0]["signals"]["z"]) == {"max_error", "rms_error", "scale", "relative_max_error"}
     assert Comparison.from_content(content, found.reference.table).content() == found.content()
