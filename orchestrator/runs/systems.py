@@ -30,6 +30,7 @@ from orchestrator.coupling.run.results import Table
 from orchestrator.landing import audit
 from orchestrator.landing.build import has_monolithic, problem
 from orchestrator.landing.fields import cable_fields
+from orchestrator.landing.impacts import Impact, impacts
 from orchestrator.landing.resolve import MESH_KEYS, MESH_TOLERANCE, Landing, Variables
 from orchestrator.landing.resolve import resolve as resolve_landing
 from orchestrator.landing.wiring import inner_step, landing_graph
@@ -102,6 +103,10 @@ class System(Protocol):
         """Return what makes the results of a run doubtful, a line each."""
         ...
 
+    def impacts(self, table: Table) -> list[Impact]:
+        """Return the impacts of wheels on a cable, and how long each lasts."""
+        ...
+
     def changed(self, options: Mapping[str, Any], **simulation: Any) -> System:
         """Return it with other options of the master and other simulation settings (macro_step, …)."""
         ...
@@ -158,6 +163,10 @@ class LandingSystem:
             return []
         arcs = (f"contact{k}.cable.s" for k in range(1, self.landing.n_wheels + 1))
         return list(self.landing.mesh.notes(table[name] for name in arcs if name in table))
+
+    def impacts(self, table: Table) -> list[Impact]:
+        """Return the impacts of the wheels, and how long each lasts."""
+        return impacts(self.landing, table)
 
     def changed(self, options: Mapping[str, Any], **simulation: Any) -> LandingSystem:
         """Return it with other options of the master and other simulation settings; the start stays as it is."""
@@ -232,6 +241,10 @@ class GraphSystem:
 
     def warnings(self, table: Table) -> list[str]:
         """Return nothing: what a run of a general graph should not do is not known."""
+        return []
+
+    def impacts(self, table: Table) -> list[Impact]:
+        """Return nothing: a general graph has no wheels."""
         return []
 
     def changed(self, options: Mapping[str, Any], **simulation: Any) -> GraphSystem:
