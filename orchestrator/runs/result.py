@@ -162,7 +162,7 @@ class Run:
 
     @property
     def warnings(self) -> list[str]:
-        """What went wrong, a line each: unconverged steps, a fall, impacts that the steps do not resolve, a tolerance missed …"""
+        """What went wrong, a line each: unconverged steps, a fall, impacts not resolved, a tolerance missed …"""
         drift = self.energy.warning() if self.energy is not None else None
         lines = [self._unconverged()] if self.summary["unconverged_steps"] else []
         lines += [f"{contact}: the cable left the groove; the robot has fallen off" for contact in self.fallen]

@@ -2,6 +2,6 @@
 
 from types import ModuleType
 
-from verification.system import convergence, energy, estimate, friction
+from verification.system import convergence, energy, estimate, friction, whole_error
 
-STUDIES: tuple[ModuleType, ...] = (energy, estimate, convergence, friction)
+STUDIES: tuple[ModuleType, ...] = (energy, estimate, whole_error, convergence, friction)
