@@ -259,13 +259,16 @@ class Cable:
     def _length_for_sag(self) -> float:
         """Return the unstretched length with which the equilibrium has the sag wanted."""
 
+        chord = float(np.hypot(self["span"], self["level_difference"]))
+        shares = self._nodes(chord) / chord  # held: what jumps by an element has no root
+
         def excess(length: float) -> float:
-            model, q = self._rest(length)
+            model = self._model(shares * length)
+            q = equilibrium(model, self["span"], self["level_difference"])
             point = np.zeros(6)
             interpolate(model, q, length / 2, np.zeros(8), point)
             return 0.5 * self["level_difference"] - point[2] - self["sag"]
 
-        chord = float(np.hypot(self["span"], self["level_difference"]))
         parabola = chord * (1.0 + 4.0 * (self["sag"] / chord) ** 2) + self["sag"] * 0.01
         longest = min(parabola, chord + 2.1 * self["sag"])
         try:
