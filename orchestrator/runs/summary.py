@@ -41,6 +41,7 @@ def summary(coupled: Coupled) -> dict[str, Any]:
         "title": scenario.title,
         "verdict": verdict(coupled),
         "notes": scenario.notes,
+        "wiring": coupled.notes,
         **about,
         "master": coupled.master,
         "exchange": coupled.exchange or None,
