@@ -228,9 +228,7 @@ def test_a_step_that_is_advised_can_be_typed():
         with pytest.raises(ValueError, match=r"0\.0166667 s does not divide 10 s; 0\.016666666666666666 s does"):
             simulate(graph, "jacobi", 0.0, 10.0, 0.0166667)
         simulate(graph, "jacobi", 0.0, 10.0, 0.016666666666666666)
-    with pytest.raises(
-        Exception, match=r"0\.0166667 s does not divide stop_time 10 s; 0\.016666666666666666 s does"
-    ):
+    with pytest.raises(Exception, match=r"0\.0166667 s does not divide stop_time 10 s; 0\.016666666666666666 s does"):
         load("oscillator", ["simulation.stop_time=10.0", "simulation.macro_step=0.0166667"])
     load("oscillator", ["simulation.stop_time=10.0", "simulation.macro_step=0.016666666666666666"])
 

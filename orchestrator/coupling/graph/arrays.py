@@ -199,17 +199,19 @@ class Arrays:
         """Return what the outputs say about the inputs at `places` of u: (len(places),)."""
         return self._continuous.moved(self.y, places)
 
-    def exchange_discrete(self) -> None:
-        """Move the discrete connections (at a communication point)."""
+    def exchange_discrete(self) -> bool:
+        """Move the discrete connections (at a communication point); return whether a number among them has changed."""
         for link in self.texts:
             self.components[link.target[0]].write(link.target[1], self.components[link.source[0]].read(link.source[1]))
         if not self.d.size:
-            return
+            return False
+        before = self.d.copy()
         for node in self.discrete:
             node.discrete_outputs.get_finite()
         self._discrete.move(self.e, self.d)
         for node in self.discrete:
             node.discrete_inputs.set()
+        return not np.array_equal(before, self.d)
 
     def companion(self, suffix: str) -> np.ndarray:
         """Return for each place in u the place of its companion (`RATE` or `MEAN`) of the same component, or -1."""

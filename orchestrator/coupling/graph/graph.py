@@ -125,6 +125,15 @@ class Graph(Arrays):
         for node in self.leaves:
             node.inputs.set()
 
+    def communicate(self) -> None:
+        """Move the discrete connections, and read anew what follows from them without a step: for masters that do not iterate.
+
+        All inputs then belong to one instant. Where a contact point travels along a cable, its motion would else be that of
+        the old point, and the contact, which counts from the new one, would take the difference for slip.
+        """
+        if self.exchange_discrete():
+            self.refresh()
+
     # -- the start ------------------------------------------------------------------------------------------
 
     def initialize(self, start: float, stop: float | None = None) -> None:
@@ -163,10 +172,9 @@ class Graph(Arrays):
         """Move all values, discrete ones too, until they stay: they go at most through all components."""
         self.refresh(stages)
         for _ in self.nodes:
-            before = self.d.copy()
-            self.exchange_discrete()
+            changed = self.exchange_discrete()
             self.refresh(stages)
-            if np.array_equal(before, self.d):
+            if not changed:
                 break
 
     # -- states ---------------------------------------------------------------------------------------------
