@@ -168,7 +168,7 @@ def test_sub_steps() -> None:
 def test_a_step_that_does_not_divide() -> None:
     with Graph(pair(), CONNECTIONS) as graph:
         for macro_step, stop, said in (
-            (0.3, 1.0, r"macro step 0\.3 s does not divide 1 s; 0\.333333 s does"),
+            (0.3, 1.0, r"macro step 0\.3 s does not divide 1 s; 0\.3333333333333333 s does"),
             (2.0, 1.0, r"macro step 2 s does not divide 1 s; 1 s does"),
             (0.0, 1.0, "must be positive"),
             (0.1, -1.0, "stop time -1 s: must be after the start at 0 s"),

@@ -13,7 +13,7 @@ from orchestrator.cli import commands as cli
 from orchestrator.coupling.run.results import read_table
 from orchestrator.runs.coupled import run_coupled
 from orchestrator.scenario.read import load
-from tests.fmus import build, compiled, needs_compiler
+from tests.fmus import build, compiled, described, needs_compiler
 from tests.scenarios import LANDING, OSCILLATOR
 
 LOOP = """
@@ -140,6 +140,49 @@ def test_a_damaged_archive_is_refused(loop, orchestrate, tmp_path, cut):
 def test_wrong_settings_are_found_before_the_run(loop, orchestrate, option, message):
     status, said = orchestrate("validate", loop, "--set", option)
     assert status == 2 and message in said
+
+
+FIXED = ('canHandleVariableCommunicationStepSize="true"', 'canHandleVariableCommunicationStepSize="false"')
+SAMPLED = """
+title = "a controller that is sampled"
+[simulation]
+stop_time = 1.0
+macro_step = 0.1
+master = "jacobi"
+tolerances = { "c.ramp.flow" = 1e-2 }
+[components.c]
+fmu = "sampled.fmu"
+parameters.only = 0.1
+"""
+
+
+@pytest.mark.parametrize("says_so", [True, False])
+def test_an_fmu_that_allows_no_finer_run_leaves_no_reference_and_is_said_to(orchestrate, tmp_path, says_so):
+    described(build("plant"), tmp_path, *([FIXED] if says_so else [])).rename(tmp_path / "sampled.fmu")
+    (tmp_path / "sampled.toml").write_text(SAMPLED, encoding="utf-8")
+    status, said = orchestrate("compare", tmp_path / "sampled.toml", "--out", tmp_path / "out", "--quiet")
+    assert status == 3 and "no reference" in said and "this controller is sampled at 0.1 s" in said
+    assert ("c cannot vary the step (canHandleVariableCommunicationStepSize is false)" in said) is says_so
+    assert "smaller" not in said
+    assert len(read_table(tmp_path / "out" / "jacobi_0.1s" / "results.csv")["time"]) == 11
+
+
+def test_open_inputs_and_another_exchange_are_said_by_validate_and_by_run(tmp_path, capsys):
+    """The shipped oscillator without its means and slopes; stdout of `validate`, stderr of `run`."""
+    text = OSCILLATOR.read_text(encoding="utf-8")
+    kept = [line for line in text.splitlines() if "_mean" not in line and "_rate" not in line]
+    (tmp_path / "less.toml").write_text("\n".join(kept), encoding="utf-8")
+    for command in (["validate"], ["run", "--quiet", "--stop", "0.1", "--no-pictures", "--out", str(tmp_path / "out")]):
+        with pytest.raises(SystemExit) as ended:
+            cli.main([*command, str(tmp_path / "less.toml")])
+        told = capsys.readouterr()
+        said = told.out if command == ["validate"] else told.err
+        assert not ended.value.code
+        assert (
+            "right: exchange held in the place of waveform, because nothing feeds right.neighbour.position_mean" in said
+        )
+        assert "inputs that nothing feeds keep their start values: left.neighbour.position" in said
+    assert json.loads((tmp_path / "out" / "summary.json").read_text())["wiring"]
 
 
 @needs_compiler

@@ -15,6 +15,7 @@ from orchestrator.coupling.graph.links import Connection, GraphError
 from orchestrator.coupling.masters import MASTERS
 from orchestrator.coupling.run.log import Log
 from orchestrator.coupling.run.simulate import simulate
+from orchestrator.coupling.stepping.least_squares import LeastSquares
 from tests.fmus import MILD, STIFF, chain, chain_solution, fmu, oscillator, oscillator_solution
 from tests.systems import IMPLICIT, ITERATED, POINT, POSITIONS, closing, faulty_oscillator, run
 
@@ -152,6 +153,35 @@ def test_step_control_books_no_work_twice():
     assert sum(step.subdivisions for step in log.steps) > 0
     x, v = log.values.T
     assert log.energy["m0.force"] == pytest.approx(0.5 * (v**2 + 10.0 * x**2) - 0.05, abs=1e-9)
+
+
+@pytest.mark.parametrize("solves", [1, 3])
+def test_columns_are_kept_for_as_many_steps_as_reuse_says(solves):
+    """All solves of a step count as one; each column is kept once. 3 iterations a solve make 2 differences."""
+    model, steps, reuse = LeastSquares(4, 2, 0.0, 0.5), 5, 2
+    rng = np.random.default_rng(1)
+    for _ in range(steps):
+        for _ in range(solves):
+            model.begin(0.01, np.ones(4))
+            for _ in range(3):
+                model.propose(rng.normal(size=4), rng.normal(size=4))
+            if solves > 1:
+                model.conclude()
+        model.accept()
+    kept = np.concatenate([V for _, V, _ in model.past])
+    assert len(model.past) == reuse and len(kept) == reuse * solves * 2
+    assert len(np.unique(kept, axis=0)) == len(kept)
+
+
+def test_interface_jacobian_keeps_no_column_twice():
+    graph = oscillator(**STIFF, waveform=True)
+    with closing(graph):
+        master = MASTERS["interface_jacobian"](graph, reuse=3)
+        simulate(graph, master, 0.0, 0.2, 0.01)
+    kept = [V for _, V, _ in master.inner.past]
+    assert 0 < len(kept) <= 3
+    rows = np.concatenate(kept)
+    assert len(np.unique(rows, axis=0)) == len(rows)
 
 
 def test_rollback_is_required():

@@ -124,7 +124,10 @@ def test_another_robot_and_another_master(file: Path):
         ("cable.parameters.damping_time=-1.0", "cable.parameters.damping_time: -1.0 must be at least 0"),
         ("simulation.macro_step=0", "simulation.macro_step: 0 must be greater than 0"),
         ("simulation.timeout=0", "simulation.timeout: 0 must be greater than 0"),
-        ("simulation.macro_step=0.3", "simulation.macro_step: 0.3 s does not divide stop_time 1 s; 0.333333 s does"),
+        (
+            "simulation.macro_step=0.3",
+            "simulation.macro_step: 0.3 s does not divide stop_time 1 s; 0.3333333333333333 s does",
+        ),
         ("simulation.macro_step=2.0", "simulation.macro_step: 2 s does not divide stop_time 1 s; 1 s does"),
         ("landing.position=50.0", "landing.position: 50 m is off the span"),
         ("landing.position=-1.0", "landing.position: -1 m is off the span"),

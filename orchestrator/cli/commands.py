@@ -112,11 +112,15 @@ def validate(scenario: options.Scenario, robot: options.Robot = None, set_: opti
     with importing():
         from orchestrator.api import load_scenario
         from orchestrator.runs.components import master_of, opened
+        from orchestrator.runs.systems import resolve
 
     loaded = load_scenario(scenario, set=set_, robot=robot)
-    with opened(loaded) as graph:
+    system = resolve(loaded)
+    with opened(system) as graph:
         master_of(loaded, graph)
         print(f"{scenario}: valid; {len(graph.components)} FMUs, {len(list(graph.connections))} connections")
+        for note in system.notes(graph):
+            print(note)
 
 
 @app.command()

@@ -30,9 +30,8 @@ def print_run(run: Run) -> None:
     from orchestrator.report.signals import extremes, in_the_air
 
     summary = run.summary
-    if summary["exchange_asked"] != summary["exchange"]:
-        asked, got = summary["exchange_asked"], summary["exchange"]
-        complain(f"cable or robot has no means or slopes for exchange {asked}: {got} in its place")
+    for note in run.wiring:
+        complain(note)
     rows = extremes(run.table, run.tolerances, summary["units"])
     print_table(("signal", "unit", "start", "min", "max", "end"), rows)
     print(

@@ -44,3 +44,8 @@ def nearest(name: str, known: Iterable[str]) -> str:
     """Return ``; did you mean mass?`` for the known name nearest to `name`, or an empty string."""
     close = get_close_matches(name, list(known), n=1, cutoff=0.5)
     return f"; did you mean {close[0]}?" if close else ""
+
+
+def digits(number: float) -> str:
+    """Return a number with all its digits, so that it can be typed: ``0.016666666666666666``, ``10``."""
+    return repr(float(number)).removesuffix(".0")

@@ -3,13 +3,14 @@
 A table says what two components may assume of one another between two communication points (`EXCHANGES`), and names say
 which variable is what. A *load* X comes with its slope over the step, ``X_rate``; a *motion* X, given at the end of the step,
 with its time mean, ``X_mean``; both are *companions* of X, the suffix stands before the axis: ``force_rate.x``. A load does
-work on the motion of the same place (`LOADS`).
+work on the motion of the same place (`LOADS`). The `names` that are asked for below are those that an FMU means so
+(`Fmu.vocabulary`): what has such a name by chance, and another unit, is not among them.
 """
 
 from __future__ import annotations
 
 import re
-from collections.abc import Container, Sequence
+from collections.abc import Container, Iterable, Sequence
 from dataclasses import dataclass
 from typing import Literal
 
@@ -75,6 +76,12 @@ def exchange_named(name: str) -> Exchange:
     return EXCHANGES.get(name, OTHER)
 
 
+def coarsest(names: Iterable[str]) -> str:
+    """Return the coarsest of several exchanges: what limits the whole. One that is not in the table counts if all are so."""
+    given = [name for name in names if name]
+    return min((n for n in given if n in EXCHANGES), key=list(EXCHANGES).index, default=next(iter(given), ""))
+
+
 def suited_to(*, implicit: bool) -> Choice:
     """Return what suits a master best: one that goes back can make slopes and means consistent."""
     return "waveform" if implicit else "point"
@@ -119,6 +126,12 @@ def suffixed(name: str, suffix: str) -> str:
     return f"{place}{last}{suffix}{axis}"
 
 
+def base_of(name: str, suffix: str) -> str | None:
+    """Return ``force.x`` for ``force_rate.x`` and ``_rate``; None if the name has no such suffix."""
+    place, last, axis = split(name)
+    return f"{place}{last.removesuffix(suffix)}{axis}" if last.endswith(suffix) and last != suffix else None
+
+
 def is_companion(name: str) -> bool:
     """Return whether `name` is that of a slope or of a mean."""
     return split(name)[1].endswith((RATE, MEAN))
@@ -136,8 +149,8 @@ def is_load(name: str, names: Container[str]) -> bool:
 
 def is_rate_of_motion(name: str, names: Container[str]) -> bool:
     """Return whether one of `names` is the rate of a motion: a value at an instant, no slope over the step."""
-    place, last, axis = split(name)
-    return last.endswith(RATE) and is_motion(f"{place}{last.removesuffix(RATE)}{axis}", names)
+    base = base_of(name, RATE)
+    return base is not None and is_motion(base, names)
 
 
 def is_from_start(name: str) -> bool:

@@ -6,6 +6,7 @@ a test holds our modules against it.
 
 from __future__ import annotations
 
+import re
 from dataclasses import dataclass
 from pathlib import Path
 from typing import Any, Literal
@@ -43,6 +44,8 @@ def _scalar(name: str, causality: Causality, unit: str, needed: bool = True, use
 
 
 INSIDE = "for what happens within a macro step"
+CONTROL = "for controlled landings"
+"""Use of inputs that are zero where nobody controls."""
 ENERGY_CONJUGATE = f"for {PARAMETER} = {suited_to(implicit=True)}"
 
 ROBOT = (
@@ -50,8 +53,8 @@ ROBOT = (
     Point("wheel[k].moment", "input", "N.m"),
     Point("wheel[k].force_rate", "input", "N/s", False, use=ENERGY_CONJUGATE),
     Point("wheel[k].moment_rate", "input", "N.m/s", False, use=ENERGY_CONJUGATE),
-    _scalar("thrust", "input", "N", False, "for controlled landings"),
-    Point("torque", "input", "N.m", False, use="for controlled landings"),
+    _scalar("thrust", "input", "N", False, CONTROL),
+    Point("torque", "input", "N.m", False, use=CONTROL),
     Point("wheel[k].position", "output", "m"),
     Point("wheel[k].axle", "output", "1"),
     Point("wheel[k].velocity", "output", "m/s"),
@@ -139,6 +142,17 @@ CONTRACTS = {"robot": ROBOT, "cable": CABLE, "contact": CONTACT}
 MOST_PORTS = 4
 BREAKS = ("missing", "wrong")
 """Verdicts with which a landing cannot run."""
+
+
+def is_control(name: str) -> bool:
+    """Return whether a robot's input is there for control, and zero without it."""
+    return any(name in point.names(1) for point in ROBOT if point.use == CONTROL)
+
+
+def is_unused(name: str, wheels: int) -> bool:
+    """Return whether a variable is that of a port beyond the last of the `wheels`."""
+    number = re.match(r"(?:port|wheel)\[(\d+)\]", name)
+    return bool(number and 0 < wheels < int(number[1]))
 
 
 @dataclass(frozen=True)

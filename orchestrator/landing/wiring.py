@@ -8,18 +8,15 @@ from pathlib import Path
 from orchestrator.catalogue import library
 from orchestrator.coupling.exchange import (
     EXCHANGES,
-    MEAN,
     PARAMETER,
-    RATE,
     Exchange,
     is_slope_of_load,
-    motion_of,
-    suffixed,
 )
 from orchestrator.coupling.fmu.instance import Fmu
 from orchestrator.coupling.fmu.sub_steps import instance
 from orchestrator.coupling.graph.graph import Graph
 from orchestrator.coupling.graph.links import Connection
+from orchestrator.coupling.graph.supply import Missing, Supply
 from orchestrator.landing.resolve import Landing
 
 LONGEST_ADAPTIVE = 2.5e-3
@@ -30,7 +27,7 @@ local error does not tell that of the cable's inner steps (docs/notebook/adaptiv
 def landing_graph(landing: Landing, exchange: str) -> Graph:
     """Return the graph of loaded FMUs: cable, robot, one contact a wheel, connected by the contract.
 
-    `waveform` becomes `hermite` where cable or robot does not give its means, `point` where one takes no slopes.
+    `waveform` becomes `hermite` where a contact does not get all means, `point` where a load's slope is not taken.
     """
     components: dict[str, Fmu] = {}
     files = _files(landing)
@@ -42,12 +39,15 @@ def landing_graph(landing: Landing, exchange: str) -> Graph:
         components["cable"].set_parameters(inner | dict(landing.cable.settings))
         components["robot"] = instance(files["robot"], "robot", landing.robot.steps)
         components["robot"].set_parameters(landing.robot.settings)
-        possible = _possible(EXCHANGES[exchange], components)
-        told = {**landing.contact.settings, PARAMETER: possible.name}
         for k, s in enumerate(landing.placement.arc_lengths, start=1):
             components[f"contact{k}"] = Fmu(files["contact"], f"contact{k}")
-            components[f"contact{k}"].set_parameters({**told, "initial.s": s})
-        return Graph(components, _connections(components, possible), order=tuple(components))
+            components[f"contact{k}"].set_parameters({**landing.contact.settings, "initial.s": s})
+        for fmu in components.values():  # the contract says so, whether or not a unit does
+            fmu.declare(name for name in fmu.ports if is_slope_of_load(name))
+        possible = _possible(EXCHANGES[exchange], components)
+        for fmu in _contacts(components).values():
+            fmu.set_parameters({PARAMETER: possible.name})
+        return Graph(components, _kept(_connections(components), possible), order=tuple(components))
     except BaseException:
         for fmu in components.values():
             fmu.close()
@@ -70,31 +70,42 @@ def inner_step(landing: Landing, exchange: Exchange) -> float:
     return min(step, LONGEST_ADAPTIVE) if landing.scenario.master.get("local_tolerance") else step
 
 
+def lacking(components: Mapping[str, Fmu]) -> Iterator[Missing]:
+    """Yield what each contact lacks of slopes and means when all is connected for which both sides have the variable."""
+    supply = Supply(components, _connections(components))
+    yield from (supply.missing(name) for name in _contacts(components))
+
+
+def _contacts(components: Mapping[str, Fmu]) -> dict[str, Fmu]:
+    return {name: fmu for name, fmu in components.items() if name.startswith("contact")}
+
+
 def _possible(exchange: Exchange, components: Mapping[str, Fmu]) -> Exchange:
-    """Return `exchange`, or the best that cable and robot admit.
+    """Return `exchange`, or the best for which every contact has what it needs.
 
     Without inputs for slopes only `point` is left: a mean force that is held feeds the contact's vibration.
     """
-    cable, robot = components["cable"].ports, components["robot"].ports
-    push, turn = "port[1].force.x", "wheel[1].moment.x"
-    slopes = suffixed(push, RATE) in cable and suffixed("wheel[1].force.x", RATE) in robot
-    means = suffixed(motion_of(push)[0], MEAN) in cable and suffixed(motion_of(turn)[0], MEAN) in robot
-    return exchange.possible(slopes=slopes, means=means)
+    for lacks in lacking(components):
+        exchange = lacks.best(exchange)
+    return exchange
 
 
-def _connections(components: Mapping[str, Fmu], exchange: Exchange) -> list[Connection]:
-    """Return all connections of the contract for which both sides have the variable.
-
-    `point` gives no slopes: left open, the masters set them by joining or extrapolating the forces of the ends.
-    """
+def _connections(components: Mapping[str, Fmu]) -> list[Connection]:
+    """Return all connections of the contract for which both sides have the variable."""
     found: list[Connection] = []
-    for name in components:
-        if not name.startswith("contact"):
-            continue
+    for name in _contacts(components):
         k = name.removeprefix("contact")
         for side, partner in (("cable", f"cable.port[{k}]"), ("wheel", f"robot.wheel[{k}]")):
             found += _links(components, f"{name}.{side}", partner)
-    return [c for c in found if exchange.slopes or not is_slope_of_load(c.source)]
+    return found
+
+
+def _kept(connections: list[Connection], exchange: Exchange) -> list[Connection]:
+    """Return the connections that serve `exchange`.
+
+    `point` gives no slopes: left open, the masters set them by joining or extrapolating the forces of the ends.
+    """
+    return [c for c in connections if exchange.slopes or not is_slope_of_load(c.source)]
 
 
 def _links(components: Mapping[str, Fmu], contact: str, partner: str) -> Iterator[Connection]:

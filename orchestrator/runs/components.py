@@ -2,7 +2,6 @@
 
 from __future__ import annotations
 
-import re
 from collections.abc import Iterator
 from contextlib import contextmanager
 
@@ -13,6 +12,7 @@ from orchestrator.coupling.fmu.failure import FmuError
 from orchestrator.coupling.fmu.sub_steps import check_steps
 from orchestrator.coupling.graph.graph import Graph
 from orchestrator.coupling.masters import MASTERS, Master
+from orchestrator.landing.contract import is_unused
 from orchestrator.runs.systems import System, resolve
 from orchestrator.scenario.types import Scenario
 
@@ -63,5 +63,4 @@ def recorded(graph: Graph) -> list[str]:
 
 def is_idle(name: str, contacts: int) -> bool:
     """Whether an output is that of an unused port, or a mean or rate that only serves the coupling."""
-    unused = re.match(r"(?:port|wheel)\[(\d+)\]", name)
-    return only_couples(name) or bool(unused and 0 < contacts < int(unused[1]))
+    return only_couples(name) or is_unused(name, contacts)

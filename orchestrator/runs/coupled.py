@@ -8,8 +8,10 @@ from functools import cached_property
 
 import numpy as np
 
-from orchestrator.coupling.errors import InputError, RunError
+from orchestrator.coupling.errors import InputError, RunError, digits
+from orchestrator.coupling.exchange import coarsest
 from orchestrator.coupling.fmu.failure import FmuError
+from orchestrator.coupling.fmu.instance import FIXED, SHORTER
 from orchestrator.coupling.graph.graph import Graph
 from orchestrator.coupling.masters import StepReport
 from orchestrator.coupling.run.interrupt import Interruption, interruptible
@@ -47,6 +49,7 @@ class Coupled:
     fmus : file and SHA-256 of every component
     error_parts : estimated error of each signal judged; empty where no estimate was asked for
     estimate_failure : which parts of it failed, and why
+    notes : what of the wiring its author may not expect, a line each
     """
 
     system: System
@@ -57,6 +60,7 @@ class Coupled:
     fmus: dict[str, dict[str, str]]
     error_parts: dict[str, Parts] = field(default_factory=dict)
     estimate_failure: str = ""
+    notes: list[str] = field(default_factory=list)
 
     @property
     def estimated_error(self) -> dict[str, float]:
@@ -106,11 +110,12 @@ def run_coupled(system: System | Scenario, progress: Reached = lambda _: None) -
     with opened(system) as graph:
         log = _simulated(system.scenario, graph, progress)
         fmus = {n: {"file": str(f.path), "sha256": f.sha256} for n, f in graph.components.items()}
-        exchange = next((fmu.exchange for fmu in graph.components.values() if fmu.exchange), "")
+        exchange = coarsest(fmu.exchange for fmu in graph.components.values())
+        notes = system.notes(graph)
     if log.error is not None and len(log.time) < 2:
         raise RunError(str(log.error), 0.0)
     fields, table = system.split(log.table)
-    return Coupled(system, exchange, log, table, fields, fmus)
+    return Coupled(system, exchange, log, table, fields, fmus, notes=notes)
 
 
 def _simulated(scenario: Scenario, graph: Graph, progress: Reached) -> Log:
@@ -132,14 +137,27 @@ def _simulated(scenario: Scenario, graph: Graph, progress: Reached) -> Log:
 
 
 def completed(system: System, progress: Reached) -> Coupled:
-    """Run a system coupled to its end; `RunError` if it does not come there, `Interrupted` after Ctrl-C."""
+    """Run a system coupled to its end.
+
+    `RunError` if it does not come there, without advice: the step is not the user's; `Interrupted` after Ctrl-C.
+    """
     try:
         coupled = run_coupled(system, progress)
     except InputError as error:  # an FMU that cannot be stepped so finely
         step = system.scenario.simulation.macro_step
-        raise RunError(f"no run with a macro step of {step:g} s: {error}") from None
+        raise RunError(f"no run with a macro step of {digits(step)} s: {error}") from None
+    except RunError as error:
+        raise _plain(error) from None
     if isinstance(coupled.log.error, Interruption):
         raise Interrupted(str(coupled.log.error), coupled.log.error.time)
     if coupled.log.error is not None:
-        raise RunError(str(coupled.log.error), coupled.log.error.time)
+        raise _plain(RunError(str(coupled.log.error), coupled.log.error.time))
     return coupled
+
+
+def _plain(error: RunError) -> RunError:
+    """Return `error` without the advice to change a step."""
+    message = str(error)
+    for advice in (SHORTER, FIXED):
+        message = message.removesuffix(advice)
+    return RunError(message, error.time)

@@ -17,7 +17,7 @@ from orchestrator.coupling.run.compare import communication_times, largest_diffe
 from orchestrator.landing import monolithic
 from orchestrator.landing.monolithic import Problem
 from orchestrator.runs.compare import Reference
-from orchestrator.runs.components import is_idle
+from orchestrator.runs.components import is_idle, opened
 from orchestrator.runs.coupled import Interrupted, Reached, completed
 from orchestrator.runs.errors import differences, judged
 from orchestrator.runs.estimate import solved
@@ -75,9 +75,25 @@ def _fine_reference(system: System, macro_steps: list[float], progress: Reached)
     except Interrupted:
         raise
     except RunError:  # an FMU cannot go back: the master that was asked for has to do
-        fine, coarse = (completed(system.changed(own, macro_step=common / n), progress) for n in (8, 4))
+        try:
+            fine, coarse = (completed(system.changed(own, macro_step=common / n), progress) for n in (8, 4))
+        except Interrupted:
+            raise
+        except RunError as error:
+            raise _without_reference(system, error) from None
     kind = f"coupled, {fine.master}, macro step {fine.log.macro_step:g} s"
     return Reference(kind, fine.table, fine.log.wall, dict(largest_difference(coarse.table, fine.table)))
+
+
+def _without_reference(system: System, error: RunError) -> RunError:
+    """Return that there is no finer run because of `error`, and whose fault it is where FMUs cannot vary their steps."""
+    with opened(system) as graph:
+        fixed = [name for name, fmu in graph.components.items() if not fmu.capabilities.variable_step]
+    whose = (
+        f"{', '.join(fixed)} cannot vary the step (canHandleVariableCommunicationStepSize is false): " if fixed else ""
+    )
+    message = f"no reference to hold the runs against: {whose}a finer run fails: {error}; `run` alone can be had"
+    return RunError(message, error.time)
 
 
 def _accurate(system: System, macro_step: float) -> System:

@@ -155,6 +155,11 @@ class Run:
         """What was decided in reading the scenario that its author may not expect, a line each."""
         return self.summary["notes"]
 
+    @property
+    def wiring(self) -> list[str]:
+        """What of the wiring its author may not expect: another exchange than that asked for, inputs that nothing feeds."""
+        return self.summary.get("wiring", [])
+
     @cached_property
     def energy(self) -> audit.Audit | None:
         """The energy audit; None where a component does not show its energy."""

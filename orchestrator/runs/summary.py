@@ -43,6 +43,7 @@ def summary(coupled: Coupled) -> dict[str, Any]:
         "verdict": verdict(coupled),
         "notes": scenario.notes,
         "warnings": coupled.system.warnings(coupled.table),
+        "wiring": coupled.notes,
         **about,
         "master": coupled.master,
         "exchange": coupled.exchange or None,

@@ -2,7 +2,7 @@
 
 from __future__ import annotations
 
-from collections.abc import Callable, Iterable, Mapping
+from collections.abc import Callable, Iterable, Mapping, Sequence
 from dataclasses import dataclass, replace
 from pathlib import Path
 from typing import TYPE_CHECKING, Any, Protocol, TypeVar
@@ -19,21 +19,24 @@ from orchestrator.coupling.exchange import (
     exchange_named,
     is_companion,
     is_rate_of_motion,
+    stems,
     suited_to,
 )
 from orchestrator.coupling.fmu.instance import Fmu
 from orchestrator.coupling.fmu.sub_steps import instance
 from orchestrator.coupling.graph.graph import Graph
 from orchestrator.coupling.graph.links import Connection
+from orchestrator.coupling.graph.supply import Missing, Supply, chosen
 from orchestrator.coupling.masters import MASTERS
 from orchestrator.coupling.run.results import Table
 from orchestrator.landing import audit
 from orchestrator.landing.build import has_monolithic, problem
+from orchestrator.landing.contract import is_control, is_unused
 from orchestrator.landing.fields import cable_fields
 from orchestrator.landing.impacts import Impact, impacts
 from orchestrator.landing.resolve import MESH_KEYS, MESH_TOLERANCE, Landing, Variables
 from orchestrator.landing.resolve import resolve as resolve_landing
-from orchestrator.landing.wiring import inner_step, landing_graph
+from orchestrator.landing.wiring import inner_step, lacking, landing_graph
 from orchestrator.scenario.types import CableSection, Component, GraphScenario, LandingScenario, RobotSection, Scenario
 
 if TYPE_CHECKING:
@@ -85,6 +88,10 @@ class System(Protocol):
 
     def graph(self) -> Graph:
         """Return the graph of newly loaded FMUs."""
+        ...
+
+    def notes(self, graph: Graph) -> list[str]:
+        """Return what of the wiring of `graph` its author may not expect, a line each."""
         ...
 
     def problem(self) -> Callable[[], Problem] | None:
@@ -139,6 +146,16 @@ class LandingSystem:
     def graph(self) -> Graph:
         """Return cable, robot and contacts as loaded FMUs, connected by the contract."""
         return landing_graph(self.landing, self.exchange)
+
+    def notes(self, graph: Graph) -> list[str]:
+        """Return another exchange than that asked for, and what nothing feeds; our cable and robot need no more than is fed."""
+        contacts = [name for name in graph.components if name.startswith("contact")]
+        foreign = {"cable": self.landing.cable.foreign, "robot": self.landing.robot.foreign}
+        named = [*contacts, *(name for name, file in foreign.items() if file is not None)]
+        names = [n for n in graph.unfed if _owner(n) in named and not is_unused(_variable(n), len(contacts))]
+        lacks = zip(contacts, lacking(graph.components), strict=True)
+        fallen = [_fallen_back(name, graph.components[name], self.exchange, what) for name, what in lacks]
+        return [*filter(None, fallen), *_unfed([n for n in names if not is_control(_variable(n))])]
 
     def problem(self) -> Callable[[], Problem] | None:
         """Return what makes the monolithic problem; None where our modules cannot stand for a foreign FMU."""
@@ -210,23 +227,37 @@ class GraphSystem:
         components: dict[str, Fmu] = {}
         try:
             for name, section in self.scenario.components.items():
-                components[name] = self._loaded(name, section)
-            return Graph(components, _kept(map(Connection.parse, self.scenario.connections), components))
+                components[name] = instance(section.fmu or library.module_fmu(str(section.model)), name, section.steps)
+            connections = [Connection.parse(text) for text in self.scenario.connections]
+            supply = Supply(components, connections)
+            for name, section in self.scenario.components.items():
+                own = self._own_exchange(name, supply) if self._follows(name) else {}
+                components[name].set_parameters({**own, **section.parameters, **section.inputs})
+            return Graph(components, _kept(connections, components))
         except BaseException:
             for fmu in components.values():
                 fmu.close()
             raise
 
-    def _loaded(self, name: str, section: Component) -> Fmu:
-        fmu = instance(section.fmu or library.module_fmu(str(section.model)), name, section.steps)
-        fmu.set_parameters({**self._own_exchange(name), **section.parameters, **section.inputs})
-        return fmu
+    def notes(self, graph: Graph) -> list[str]:
+        """Return where the exchange is another than that asked for, and the inputs that nothing feeds."""
+        supply = Supply(graph.components, map(Connection.parse, self.scenario.connections))
+        fallen = [
+            _fallen_back(name, fmu, exchange_of(self.scenario), supply.missing(name))
+            for name, fmu in graph.components.items()
+            if self._follows(name)
+        ]
+        return [*filter(None, fallen), *_unfed(graph.unfed)]
 
-    def _own_exchange(self, name: str) -> dict[str, str]:
-        """Return the exchange as a parameter of one of our modules, where it has this one."""
-        known, exchange = self.variables[name].get(PARAMETER), exchange_of(self.scenario)
-        ours = self.scenario.components[name].model is not None
-        return {PARAMETER: exchange} if ours and known is not None and exchange in known.choices else {}
+    def _follows(self, name: str) -> bool:
+        """Return whether a component is one of our modules that has the exchange as a parameter, and is left to choose."""
+        section = self.scenario.components[name]
+        return section.model is not None and PARAMETER in self.variables[name] and PARAMETER not in section.parameters
+
+    def _own_exchange(self, name: str, supply: Supply) -> dict[str, str]:
+        """Return the exchange as a parameter of one of our modules: what is asked for, or the next best that it has."""
+        exchange = chosen(exchange_of(self.scenario), self.variables[name][PARAMETER].choices, supply.missing(name))
+        return {PARAMETER: exchange} if exchange else {}
 
     def problem(self) -> None:
         """Return None: a general graph has no monolithic solver."""
@@ -281,6 +312,27 @@ def exchange_of(scenario: Scenario) -> Choice:
     return scenario.simulation.exchange or suited_to(implicit=MASTERS[scenario.simulation.master].IMPLICIT)
 
 
+def _fallen_back(name: str, fmu: Fmu, asked: str, lacks: Missing) -> str:
+    """Return that a component has another exchange than that `asked` for, and why; empty if nothing keeps it from that."""
+    why = lacks.why(EXCHANGES[asked])
+    if not why or fmu.exchange == asked:
+        return ""
+    return f"{name}: exchange {fmu.exchange} in the place of {asked}, because {why}"
+
+
+def _unfed(names: Sequence[str]) -> list[str]:
+    """Return the line that lists inputs which nothing feeds, x, y, z together; none if there is none."""
+    return [f"inputs that nothing feeds keep their start values: {', '.join(stems(names))}"] if names else []
+
+
+def _owner(signal: str) -> str:
+    return signal.partition(".")[0]
+
+
+def _variable(signal: str) -> str:
+    return signal.partition(".")[2]
+
+
 def _scaled(section: Stepped, known: Variables, ratio: float) -> Stepped:
     """Return the section of a component with its inner step `ratio` times as long, if it has one."""
     if INNER_STEP not in known or known[INNER_STEP].causality != "parameter":
@@ -299,4 +351,4 @@ def _is_held(connection: Connection, components: Mapping[str, Fmu]) -> bool:
     split = [signal.partition(".") for signal in (connection.source, connection.target)]
     ends = [(components[name], variable) for name, _, variable in split if name in components]
     holding = any(not exchange_named(fmu.exchange).slopes for fmu, _ in ends)
-    return holding and not any(is_rate_of_motion(variable, fmu.ports) for fmu, variable in ends)
+    return holding and not any(is_rate_of_motion(variable, fmu.vocabulary) for fmu, variable in ends)

@@ -14,7 +14,7 @@ from fmus.module.variables import Variable
 from orchestrator.catalogue import modules as vocabulary
 from orchestrator.catalogue.documents import Document
 from orchestrator.catalogue.quantities import Complaint, Scalar
-from orchestrator.coupling.errors import InputError, nearest
+from orchestrator.coupling.errors import InputError, digits, nearest
 from orchestrator.coupling.masters.options import master_options, out_of_bounds
 from orchestrator.scenario.types import DEFAULT_MASTER, UNITS, Provenance
 
@@ -165,7 +165,8 @@ def _step_problems(document: Document) -> Iterator[Complaint]:
     n = max(1, round(stop / step))
     if abs(n * step - stop) > 1e-9 * stop:
         yield Complaint(
-            "simulation.macro_step", f"{step:g} s does not divide stop_time {stop:g} s; {stop / n:.6g} s does"
+            "simulation.macro_step",
+            f"{digits(step)} s does not divide stop_time {digits(stop)} s; {digits(stop / n)} s does",
         )
 
 

@@ -34,6 +34,9 @@ int fmi2GetReal(void *c, const unsigned vr[], size_t n, double values[]) {
         else if (vr[i] == VR_U) values[i] = lag->u;
         else if (vr[i] == VR_GAIN) values[i] = lag->gain;
         else if (vr[i] == VR_START) values[i] = lag->x;
+        else if (vr[i] == VR_DURATION) values[i] = lag->duration;
+        else if (vr[i] == VR_FAULT) values[i] = lag->fault;
+        else if (vr[i] == VR_FAULT_TIME) values[i] = lag->fault_time;
         else return ERROR;
     }
     return OK;

@@ -2,8 +2,8 @@
 
 The landing at 20 m over 5 s; each row changes one thing and gives the largest difference in Z and in roll over their
 peak to peak. The discretisation (mesh, tolerance, macro step) has an exact answer, from which the differences are
-taken: 240 elements as the mesh found by itself places them, a hundredth of the tolerance, the monolithic solution. The contact's stiffness and
-its reference length are assumed: their rows show what the assumption is worth, as a difference from the default.
+taken: 240 elements as the mesh found by itself places them, a hundredth of the tolerance, the monolithic solution. The
+contact's stiffness and its reference length are assumed: their rows show what the assumption is worth, as a difference from the default.
 """
 
 from __future__ import annotations
@@ -31,7 +31,10 @@ def _mesh(n: int, grading: float) -> dict[str, object]:
 
 
 def run(figures: Path) -> Result:
-    default, fine = monolithic(scenario(stop=STOP)), monolithic(scenario(stop=STOP, **{"cable.parameters.mesh_tolerance": FINE}))
+    default, fine = (
+        monolithic(scenario(stop=STOP)),
+        monolithic(scenario(stop=STOP, **{"cable.parameters.mesh_tolerance": FINE})),
+    )
     table = ["| what is changed | Z [-] | roll [-] | held against |", "|---|---|---|---|"]
 
     def line(label: str, found, truth, against: str) -> tuple[float, float]:

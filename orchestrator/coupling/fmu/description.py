@@ -31,7 +31,8 @@ Value = float | int | bool | str
 class Port:
     """One scalar variable of an FMU; an array of FMI 3.0 is one port an element, ``name[1]``, ``name[2]`` …
 
-    `variable` is the name of the whole variable, `size` its number of elements, `element` counts them from 0.
+    `variable` is the name of the whole variable, `size` its number of elements, `element` counts them from 0; `relative`:
+    it is a difference of two quantities, in which an offset of the unit cancels.
     """
 
     name: str
@@ -45,6 +46,7 @@ class Port:
     variable: str
     size: int = 1
     element: int = 0
+    relative: bool = False
 
     @property
     def is_number(self) -> bool:
@@ -86,7 +88,8 @@ def ports_of(variable: ModelVariable) -> list[Port]:
         variable.name,
         size,
     )
-    return [Port(name, variable.valueReference, *fixed, i) for i, name in enumerate(names)]
+    relative = bool(variable.relativeQuantity)
+    return [Port(name, variable.valueReference, *fixed, i, relative) for i, name in enumerate(names)]
 
 
 def sha256_of(path: Path) -> str:
@@ -101,7 +104,27 @@ def parsed(path: Path) -> ModelDescription:
 
 @lru_cache(maxsize=32)
 def _parsed(path: Path, sha256: str) -> ModelDescription:
-    return fmpy.read_model_description(str(path), validate=False)
+    description = fmpy.read_model_description(str(path), validate=False)
+    relative = _differences(path)
+    for variable in description.modelVariables:
+        stated, type_ = relative.get(variable.name), variable.declaredType
+        variable.relativeQuantity = bool(type_ and type_.relativeQuantity) if stated is None else stated
+    return description
+
+
+def _differences(path: Path) -> dict[str, bool]:
+    """Return what the reals of a description say of ``relativeQuantity``; FMPy 0.3 does not find the attribute."""
+    said: dict[str, bool] = {}
+    for variable in _model_description(path).iterfind("ModelVariables/*"):
+        for element in (variable, *variable):
+            if (text := element.get("relativeQuantity")) is not None:
+                said[variable.get("name", "")] = text in ("true", "1")
+    return said
+
+
+def _model_description(path: Path) -> ElementTree.Element:
+    with zipfile.ZipFile(path) as archive, archive.open("modelDescription.xml") as file:
+        return ElementTree.parse(file).getroot()
 
 
 def read_description(path: Path) -> tuple[ModelDescription, str]:
@@ -124,8 +147,7 @@ def read_description(path: Path) -> tuple[ModelDescription, str]:
 
 def _provides_derivatives(path: Path) -> bool:
     """Return what an FMI 3.0 description says; FMPy 0.3 looks for the attribute under its name in FMI 2.0."""
-    with zipfile.ZipFile(path) as archive, archive.open("modelDescription.xml") as file:
-        interface = ElementTree.parse(file).find("CoSimulation")
+    interface = _model_description(path).find("CoSimulation")
     return interface is not None and interface.get("providesDirectionalDerivatives") in ("true", "1")
 
 

@@ -9,7 +9,8 @@ from __future__ import annotations
 import atexit
 import contextlib
 import logging
-from collections.abc import Mapping, Sequence
+import re
+from collections.abc import Iterable, Mapping, Sequence
 from pathlib import Path
 from time import perf_counter
 from typing import Any, Self
@@ -17,7 +18,7 @@ from typing import Any, Self
 import fmpy
 import numpy as np
 
-from orchestrator.coupling.errors import nearest
+from orchestrator.coupling.errors import digits, nearest
 from orchestrator.coupling.exchange import PARAMETER
 from orchestrator.coupling.fmu.binding import (
     DISCARD,
@@ -33,11 +34,18 @@ from orchestrator.coupling.fmu.binding import (
 from orchestrator.coupling.fmu.description import Port, Value, capabilities_of, ports_of, read_description
 from orchestrator.coupling.fmu.failure import NOT_FINITE, FmuError
 from orchestrator.coupling.fmu.group import Group
+from orchestrator.coupling.fmu.python_modules import own_modules
 from orchestrator.coupling.fmu.unzipped import unzip
+from orchestrator.coupling.fmu.vocabulary import vocabulary_of
 
 logging.getLogger("fmus").addHandler(logging.NullHandler())  # what our FMUs say comes through FMI, like that of others
 
 SHORTER, FORWARD = "; a smaller macro step may help", "; take a master that never goes back, jacobi or gauss_seidel"
+EXCEPTION = re.compile(r"(\w+\.)*\w*(Error|Exception)\b")
+"""How a line begins that names an exception of Python."""
+ROUNDING = 16 * np.finfo(float).eps
+"""Relative distance to the stop time within which a step is meant to end there."""
+FIXED = "; it cannot vary its step (canHandleVariableCommunicationStepSize is false), take the macro step that it is made for"
 CURES = {DISCARD: SHORTER, NOT_FINITE: SHORTER}
 
 
@@ -51,11 +59,14 @@ class Fmu:
 
     Attributes
     ----------
+    folder : where it is unzipped
     ports : the variables by name
+    vocabulary : the names among them that mean what they say (`orchestrator.coupling.exchange`): ``X_rate`` is there if its
+        unit is that of X per second, or if it is declared to be the slope of X
     log : messages of the FMU
     parameters : what `set_parameters` was given
     solves, wall : steps made and the seconds spent in them
-    time : s, start of the last step
+    time, stop : s, start of the last step; where the run ends, nan where nobody says it
     busy_since : clock at which the running call began, 0 when none runs
     worst : highest FMI status that a call came back with, beyond warning
     abandoned : a call of this run was given up and may still return: nothing of it may be touched any more
@@ -66,17 +77,24 @@ class Fmu:
         self.description, self.sha256 = read_description(self.path)
         self.name = name or str(self.description.modelName)
         self.ports = {p.name: p for v in self.description.modelVariables for p in ports_of(v)}
+        self.vocabulary = vocabulary_of(self.description, self.ports)
         self.capabilities = capabilities_of(self.description)
         self.log: list[str] = []
         self.parameters: dict[str, Value] = {}
         self.solves, self.wall, self.time, self.busy_since = 0, 0.0, 0.0, 0.0
+        self.stop = np.nan
         self.worst, self.initialized = 0, False
         _require_possible(self)
         self.abandoned = False
         binding = Fmi3 if str(self.description.fmiVersion).startswith("3") else Fmi2
         try:
-            with contextlib.chdir("."):  # FMPy stays in the library's folder if that cannot be loaded
-                self.fmi = binding(self.description, unzip(self.path, self.sha256), self.name, self._message)
+            self.folder = unzip(self.path, self.sha256)
+            loaded = [other.folder for other in _instances]
+            with (
+                own_modules(self.folder, loaded),
+                contextlib.chdir("."),
+            ):  # FMPy stays in the library's folder if that cannot be loaded
+                self.fmi = binding(self.description, self.folder, self.name, self._message)
         except Exception as error:
             hint = f" ({_gist(self.log[-1])})" if self.log else ""
             raise ValueError(f"{self.path}: the FMU cannot be loaded: {error}{hint}") from error
@@ -119,6 +137,10 @@ class Fmu:
         if name not in self.ports:
             raise ValueError(f"{self.name}: no variable {name}{nearest(name, self.ports)}")
         return self.ports[name]
+
+    def declare(self, names: Iterable[str]) -> None:
+        """Take `names` for what they say, whatever their units: ``force_rate`` for the slope of ``force``."""
+        self.vocabulary |= {self.port(name).name for name in names}
 
     def set_parameters(self, values: Mapping[str, Value]) -> None:
         """Set parameters (and start values of inputs) before initialisation.
@@ -191,7 +213,7 @@ class Fmu:
     def enter_initialization(self, start: float, stop: float | None = None) -> None:
         """Set up the experiment and enter initialisation mode."""
         self._require_open()
-        self.time = start
+        self.time, self.stop = start, np.nan if stop is None else stop
         self._call("initialisation", self.fmi.enter_initialization, start, stop)
 
     def exit_initialization(self) -> None:
@@ -207,7 +229,9 @@ class Fmu:
             raise self.error(status, doing)
 
     def step(self, t: float, h: float) -> None:
-        """Advance from `t` to `t + h` (s) with the inputs set before."""
+        """Advance from `t` to `t + h` (s) with the inputs set before; a step that ends at the stop time ends there exactly."""
+        if t + h != self.stop and abs(self.stop - t - h) <= ROUNDING * abs(self.stop):
+            h = self.stop - t
         self.time = t
         self.solves += 1
         self.busy_since = clock = perf_counter()
@@ -215,7 +239,7 @@ class Fmu:
         self.wall += perf_counter() - clock
         self.busy_since = 0.0
         if status > WARNING:
-            raise self.error(status, f"the step of {h:.6g} s")
+            raise self.error(status, f"the step of {digits(h)} s", "" if self.capabilities.variable_step else FIXED)
 
     def allows(self, h: float, H: float) -> bool:
         """Return whether steps `h` can be made where the master's own are `H`, s."""
@@ -253,9 +277,13 @@ class Fmu:
 
 
 def _gist(message: str) -> str:
-    """Return the line of a message that says what happened: the first, of a traceback the last."""
-    lines = [line for line in message.splitlines() if line.strip()] or [""]
-    return lines[-1] if "Traceback" in lines[0] else lines[0]
+    """Return the line of a message that says what happened: the first, of a traceback the last; behind the first an exception
+    that a later line names."""
+    lines = [line.strip() for line in message.splitlines() if line.strip()] or [""]
+    if "Traceback" in lines[0]:
+        return lines[-1]
+    named = [line for line in lines[1:] if EXCEPTION.match(line)]
+    return ": ".join([lines[0], *named[-1:]])
 
 
 def _require_possible(fmu: Fmu) -> None:
@@ -268,8 +296,8 @@ def _require_possible(fmu: Fmu) -> None:
     interface: Any = fmu.description.coSimulation
     if interface.canBeInstantiatedOnlyOncePerProcess and any(other.sha256 == fmu.sha256 for other in _instances):
         raise ValueError(
-            f"{fmu.path}: can be instantiated only once per process, {fmu.name} would be the second; use a copy of "
-            "the model under another name"
+            f"{fmu.path}: can be instantiated only once per process, {fmu.name} would be the second, and a copy of the file "
+            "is the same FMU; export the model once more under another name (another modelIdentifier)"
         )
 
 

@@ -9,6 +9,7 @@ from pathlib import Path
 
 import numpy as np
 
+from orchestrator.coupling.errors import digits
 from orchestrator.coupling.exchange import MEAN, RATE, is_from_start, is_load, is_motion, suffixed
 from orchestrator.coupling.fmu.binding import ERROR, SavedState
 from orchestrator.coupling.fmu.description import Port
@@ -62,7 +63,7 @@ class SubStepped(Fmu):
     def _name_inputs(self) -> None:
         ports = self.ports
         names = [n for n, p in ports.items() if _is_continuous(p, "input")]
-        known = set(names)
+        known = self.vocabulary.intersection(names)
         motions = [n for n in names if is_motion(n, known)]
         means = [suffixed(n, MEAN) for n in motions]
         rates = [suffixed(n, RATE) for n in names if is_load(n, known)]
@@ -70,6 +71,7 @@ class SubStepped(Fmu):
         wanted = [suffixed(n, RATE) for n in alone]
         self.made_up = [] if means else [rate for rate in wanted if rate not in ports]
         ports.update({rate: _rate_port(rate) for rate in self.made_up})
+        self.declare(self.made_up)
         self.place = {n: i for i, n in enumerate([*names, *self.made_up])}
         loads = [n for n, rate in zip(alone, wanted, strict=True) if rate in self.place]
         self.load, self.slope = self._places(loads), self._places([suffixed(n, RATE) for n in loads])
@@ -85,7 +87,7 @@ class SubStepped(Fmu):
 
     def _name_outputs(self) -> None:
         names = [n for n, p in self.ports.items() if _is_continuous(p, "output")]
-        known = set(names)
+        known = self.vocabulary.intersection(names)
         motions = [n for n in names if is_motion(n, known)]
         turned = [n for n in motions if is_from_start(n)]
         plain = [suffixed(n, MEAN) for n in motions if n not in turned]
@@ -163,7 +165,7 @@ class SubStepped(Fmu):
                 self.name,
                 t,
                 ERROR,
-                f"a step of {h:.6g} s is no multiple of its own of {self.length:.6g} s, which it cannot vary "
+                f"a step of {digits(h)} s is no multiple of its own of {digits(self.length)} s, which it cannot vary "
                 "(canHandleVariableCommunicationStepSize is false)",
             )
         return round(h / self.length)
@@ -255,6 +257,6 @@ def check_steps(components: Mapping[str, Fmu], H: float) -> None:
         internal = fmu.capabilities.internal_step
         if internal and not _is_whole(H / steps / internal):
             raise ValueError(
-                f"{name}: its communication step of {H / steps:.6g} s (macro step {H:.6g} s, steps = {steps}) is no "
-                f"multiple of its fixed internal step of {internal:.6g} s; change macro_step or steps"
+                f"{name}: its communication step of {digits(H / steps)} s (macro step {digits(H)} s, steps = {steps}) is no "
+                f"multiple of its fixed internal step of {digits(internal)} s; change macro_step or steps"
             )

@@ -7,7 +7,7 @@ from dataclasses import dataclass
 
 import numpy as np
 
-from orchestrator.coupling.exchange import RATE, is_load, suffixed
+from orchestrator.coupling.exchange import RATE, is_companion, is_load, suffixed
 from orchestrator.coupling.fmu.group import Group
 from orchestrator.coupling.fmu.instance import Fmu
 from orchestrator.coupling.graph.links import Link, Signal
@@ -129,7 +129,9 @@ class Arrays:
         numbers = [k for k in links if self._kind(k) != "string"]
         self._allocate_continuous([k for k in numbers if not k.discrete], rank)
         self._allocate_discrete([k for k in numbers if k.discrete], rank)
-        self.nodes = [self._node(name) for name in order]
+        signals = (self._inputs, self._outputs, self._discrete_inputs, self._discrete_outputs, self.free_rates)
+        places = [_slices(some) for some in signals]
+        self.nodes = [self._node(name, *(some.get(name, slice(0, 0)) for some in places)) for name in order]
         self.discrete = [n for n in self.nodes if n.discrete_inputs.names or n.discrete_outputs.names]
 
     def _kind(self, link: Link) -> str:
@@ -154,29 +156,33 @@ class Arrays:
         self._discrete = Transfer.along(links, self._discrete_outputs)
 
     def _free_rates(self) -> tuple[list[Signal], np.ndarray]:
-        """Return the inputs ``_rate`` of connected loads that nothing feeds, and the places of those loads
-        in u."""
+        """Return the inputs ``_rate`` of connected loads that nothing feeds and nobody has set, and the places of those
+        loads in u."""
         fed = set(self._inputs)
         rates, places = [], []
         for i, (component, name) in enumerate(self._inputs):
-            ports, rate = self.components[component].ports, (component, suffixed(name, RATE))
-            if is_load(name, ports) and ports[rate[1]].causality == "input" and rate not in fed:
+            fmu, rate = self.components[component], (component, suffixed(name, RATE))
+            held = rate in fed or rate[1] in fmu.parameters
+            if is_load(name, fmu.vocabulary) and fmu.ports[rate[1]].causality == "input" and not held:
                 rates.append(rate)
                 places.append(i)
         return rates, np.array(places, dtype=np.intp)
 
-    def _node(self, name: str) -> Node:
-        fmu, inputs = self.components[name], _places(self._inputs, name)
+    def _node(
+        self, name: str, inputs: slice, outputs: slice, discrete_inputs: slice, discrete_outputs: slice, rates: slice
+    ) -> Node:
+        """Return a component, given where its signals are in the arrays."""
+        fmu = self.components[name]
         torn = int(np.sum((self.torn >= inputs.start) & (self.torn < inputs.stop)))
         forward = slice(inputs.start + torn, inputs.stop)
         return Node(
             name,
             fmu,
-            inputs=_group(fmu, name, self._inputs, self.u),
-            outputs=_group(fmu, name, self._outputs, self.y),
-            discrete_inputs=_group(fmu, name, self._discrete_inputs, self.d),
-            discrete_outputs=_group(fmu, name, self._discrete_outputs, self.e),
-            rates=_group(fmu, name, self.free_rates, self.r),
+            inputs=_group(fmu, self._inputs, inputs, self.u),
+            outputs=_group(fmu, self._outputs, outputs, self.y),
+            discrete_inputs=_group(fmu, self._discrete_inputs, discrete_inputs, self.d),
+            discrete_outputs=_group(fmu, self._discrete_outputs, discrete_outputs, self.e),
+            rates=_group(fmu, self.free_rates, rates, self.r),
             acted=self.acted[inputs],
             first=inputs.start,
             torn=torn,
@@ -193,22 +199,30 @@ class Arrays:
         """Return what the outputs say about the inputs at `places` of u: (len(places),)."""
         return self._continuous.moved(self.y, places)
 
-    def exchange_discrete(self) -> None:
-        """Move the discrete connections (at a communication point)."""
+    def exchange_discrete(self) -> bool:
+        """Move the discrete connections (at a communication point); return whether a number among them has changed."""
         for link in self.texts:
             self.components[link.target[0]].write(link.target[1], self.components[link.source[0]].read(link.source[1]))
         if not self.d.size:
-            return
+            return False
+        before = self.d.copy()
         for node in self.discrete:
             node.discrete_outputs.get_finite()
         self._discrete.move(self.e, self.d)
         for node in self.discrete:
             node.discrete_inputs.set()
+        return not np.array_equal(before, self.d)
 
     def companion(self, suffix: str) -> np.ndarray:
         """Return for each place in u the place of its companion (`RATE` or `MEAN`) of the same component, or -1."""
-        place = {name: i for i, name in enumerate(self.input_names)}
+        place = {name: i for i, name in enumerate(self.input_names) if self._is_meant(i)}
         return np.array([place.get(suffixed(name, suffix), -1) for name in self.input_names], dtype=np.intp)
+
+    def _is_meant(self, place: int) -> bool:
+        """Return whether the name of an input means what it says, or what feeds it is the slope or the mean of a source."""
+        ends = self.links[place].target, self.links[place].source
+        (mine, taker), (theirs, giver) = ((name, self.components[owner].vocabulary) for owner, name in ends)
+        return mine in taker or (theirs in giver and is_companion(theirs))
 
 
 def _outputs(links: Sequence[Link], rank: Mapping[str, int]) -> list[Signal]:
@@ -216,13 +230,14 @@ def _outputs(links: Sequence[Link], rank: Mapping[str, int]) -> list[Signal]:
     return sorted(dict.fromkeys(k.source for k in links), key=lambda signal: rank[signal[0]])
 
 
-def _places(signals: Sequence[Signal], component: str) -> slice:
-    """Return where those of `component` are among `signals`: they stand together."""
-    mine = [i for i, (owner, _) in enumerate(signals) if owner == component]
-    return slice(mine[0], mine[-1] + 1) if mine else slice(0, 0)
+def _slices(signals: Sequence[Signal]) -> dict[str, slice]:
+    """Return for each component where its own are among `signals`: they stand together."""
+    found: dict[str, slice] = {}
+    for i, (owner, _) in enumerate(signals):
+        found[owner] = slice(found[owner].start if owner in found else i, i + 1)
+    return found
 
 
-def _group(fmu: Fmu, component: str, signals: Sequence[Signal], values: np.ndarray) -> Group:
-    """Return a handle on those of `component` among `signals`, whose values are a slice of `values`."""
-    places = _places(signals, component)
+def _group(fmu: Fmu, signals: Sequence[Signal], places: slice, values: np.ndarray) -> Group:
+    """Return a handle on the signals at `places`, whose values are a slice of `values`."""
     return fmu.group([name for _, name in signals[places]], values[places])

@@ -19,6 +19,7 @@ from orchestrator.coupling.graph.arrays import Arrays, Node
 from orchestrator.coupling.graph.links import Connection, GraphError, checked_links
 from orchestrator.coupling.graph.loops import AlgebraicLoop
 from orchestrator.coupling.graph.order import Dependencies, dependencies_of, derived_order, levels
+from orchestrator.coupling.graph.supply import require_supplied, unfed
 
 
 class Observer(Protocol):
@@ -69,6 +70,7 @@ class Graph(Arrays):
         _name(components)
         self.connections = tuple(Connection.parse(c) if isinstance(c, str) else c for c in connections)
         links = checked_links(components, self.connections)
+        require_supplied(components, self.connections)
         self.feedthrough = dependencies_of(components, initial=False)
         self.order = (
             derived_order(components, links, self.feedthrough) if order is None else _checked_order(order, components)
@@ -89,6 +91,12 @@ class Graph(Arrays):
 
     def __exit__(self, *_: object) -> None:
         self.close()
+
+    @property
+    def unfed(self) -> list[str]:
+        """Continuous inputs, ``component.variable``, that keep their start value: nothing feeds them, nobody has set them."""
+        made = map(".".join, self.free_rates)
+        return unfed(self.components, (c.target for c in self.connections), made)
 
     # -- outputs at a fixed time ----------------------------------------------------------------------------
 
@@ -116,6 +124,15 @@ class Graph(Arrays):
         self.gather()
         for node in self.leaves:
             node.inputs.set()
+
+    def communicate(self) -> None:
+        """Move the discrete connections, and read anew what follows from them without a step: for masters that do not iterate.
+
+        All inputs then belong to one instant. Where a contact point travels along a cable, its motion would else be that of
+        the old point, and the contact, which counts from the new one, would take the difference for slip.
+        """
+        if self.exchange_discrete():
+            self.refresh()
 
     # -- the start ------------------------------------------------------------------------------------------
 
@@ -155,10 +172,9 @@ class Graph(Arrays):
         """Move all values, discrete ones too, until they stay: they go at most through all components."""
         self.refresh(stages)
         for _ in self.nodes:
-            before = self.d.copy()
-            self.exchange_discrete()
+            changed = self.exchange_discrete()
             self.refresh(stages)
-            if np.array_equal(before, self.d):
+            if not changed:
                 break
 
     # -- states ---------------------------------------------------------------------------------------------

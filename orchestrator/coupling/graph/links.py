@@ -98,7 +98,7 @@ def _split(components: Mapping[str, Fmu], signal: str, where: str) -> Signal:
 
 
 def _conversion(fmu_a: Fmu, a: Port, fmu_b: Fmu, b: Port, where: str) -> tuple[float, float]:
-    """Return gain and offset from a's unit to b's."""
+    """Return gain and offset from a's unit to b's; a difference has no offset."""
     if not a.unit or not b.unit or a.unit == b.unit:
         return 1.0, 0.0
     unit_a, unit_b = _unit(fmu_a, a.unit), _unit(fmu_b, b.unit)
@@ -110,7 +110,13 @@ def _conversion(fmu_a: Fmu, a: Port, fmu_b: Fmu, b: Port, where: str) -> tuple[f
     if any(int(getattr(base_a, e) or 0) != int(getattr(base_b, e) or 0) for e in EXPONENTS):
         raise GraphError(f"{where}: unit {a.unit} is no measure of {b.unit}; connect like with like")
     factor = float(base_b.factor)
-    return float(base_a.factor) / factor, (float(base_a.offset) - float(base_b.offset)) / factor
+    offset = (float(base_a.offset) - float(base_b.offset)) / factor
+    if a.relative is not b.relative and offset:
+        raise GraphError(
+            f"{where}: one of the two is a difference (relativeQuantity), the other is not, and {a.unit} and {b.unit} differ "
+            "by an offset; connect like with like, or give both one unit"
+        )
+    return float(base_a.factor) / factor, 0.0 if a.relative else offset
 
 
 def _unit(fmu: Fmu, name: str) -> Unit | None:

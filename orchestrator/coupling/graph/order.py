@@ -2,7 +2,7 @@
 
 from __future__ import annotations
 
-from collections.abc import Iterable, Mapping, Sequence
+from collections.abc import Container, Iterable, Mapping
 
 import numpy as np
 
@@ -10,6 +10,8 @@ from orchestrator.coupling.fmu.instance import Fmu
 from orchestrator.coupling.graph.links import Link, Signal
 
 Dependencies = dict[str, dict[str, frozenset[str] | None]]
+Edge = tuple[int, int]
+"""From one vertex to another, by their numbers."""
 
 
 def dependencies_of(components: Mapping[str, Fmu], *, initial: bool) -> Dependencies:
@@ -30,7 +32,7 @@ def dependencies_of(components: Mapping[str, Fmu], *, initial: bool) -> Dependen
     return table
 
 
-def _components_of(edges: Iterable[tuple[int, int]], n: int) -> np.ndarray:
+def _components_of(edges: Iterable[Edge], n: int) -> np.ndarray:
     """Return the number of the strongly connected component of each of `n` vertices, sources before what
     they feed."""
     pairs = set(edges)
@@ -39,30 +41,71 @@ def _components_of(edges: Iterable[tuple[int, int]], n: int) -> np.ndarray:
     return np.array([ranks[label] * (n + 1) + label for label in labels])
 
 
-def _strongly_connected(edges: Iterable[tuple[int, int]], n: int) -> list[int]:
+def _neighbours(edges: Iterable[Edge], n: int) -> list[list[int]]:
+    """Return for each of `n` vertices those that an edge leads to."""
+    following: list[list[int]] = [[] for _ in range(n)]
+    for a, b in edges:
+        following[a].append(b)
+    return following
+
+
+def _strongly_connected(edges: Iterable[Edge], n: int) -> list[int]:
     """Return for each of `n` vertices the number of its strongly connected component; they count by their first vertex.
 
-    Two vertices are in the same one if each can be reached from the other: squaring the matrix of what is reached doubles
-    the length of the paths.
+    R. Tarjan, Depth-first search and linear graph algorithms, SIAM J. Comput. 1 (1972) 146-160, without recursion: a
+    component ends at the vertex from which none found before it can be reached.
     """
-    reached = np.eye(n, dtype=np.float32)
-    for a, b in edges:
-        reached[a, b] = 1.0
-    for _ in range(n.bit_length()):
-        reached = np.minimum(reached @ reached, 1.0)
-    first = np.argmax(np.minimum(reached, reached.T), axis=1)
-    return np.unique(first, return_inverse=True)[1].tolist()
+    following = [iter(vertices) for vertices in _neighbours(edges, n)]
+    found, lowest, first, open_ = [-1] * n, [n] * n, [-1] * n, list[int]()
+    count = 0
+    for root in range(n):
+        path = [root] if found[root] < 0 else []
+        while path:
+            v = path[-1]
+            if found[v] < 0:
+                found[v] = lowest[v] = count
+                count += 1
+                open_.append(v)
+            w = next(following[v], -1)
+            if w >= 0:
+                if found[w] < 0:
+                    path.append(w)
+                elif first[w] < 0:
+                    lowest[v] = min(lowest[v], found[w])
+                continue
+            path.pop()
+            if path:
+                lowest[path[-1]] = min(lowest[path[-1]], lowest[v])
+            if lowest[v] == found[v]:
+                _close(v, open_, first)
+    number = {vertex: i for i, vertex in enumerate(sorted(set(first)))}
+    return [number[vertex] for vertex in first]
 
 
-def _longest_paths(edges: Sequence[tuple[int, int]], n: int) -> list[int]:
-    """Return for each vertex of a graph without cycles the length of the longest path that ends there."""
-    rank = [0] * n
-    for _ in range(n):
-        changed = [(b, rank[a] + 1) for a, b in edges if rank[b] < rank[a] + 1]
-        if not changed:
-            break
-        for b, value in changed:
-            rank[b] = max(rank[b], value)
+def _close(v: int, open_: list[int], first: list[int]) -> None:
+    """Take the strongly connected component that `v` ends from the open vertices; write its first vertex for each."""
+    members = [open_.pop()]
+    while members[-1] != v:
+        members.append(open_.pop())
+    least = min(members)
+    for w in members:
+        first[w] = least
+
+
+def _longest_paths(edges: Iterable[Edge], n: int, light: Container[int] = ()) -> list[int]:
+    """Return for each vertex of a graph without cycles the length of the longest path that ends there; edges to `light`
+    vertices have none."""
+    pairs = set(edges)
+    following, waiting, rank = _neighbours(pairs, n), [0] * n, [0] * n
+    for _, b in pairs:
+        waiting[b] += 1
+    ready = [v for v in range(n) if not waiting[v]]
+    for a in ready:  # grows on the way
+        for b in following[a]:
+            rank[b] = max(rank[b], rank[a] + (b not in light))
+            waiting[b] -= 1
+            if not waiting[b]:
+                ready.append(b)
     return rank
 
 
@@ -81,11 +124,16 @@ def derived_order(components: Mapping[str, Fmu], links: list[Link], feedthrough:
     return tuple(sorted(names, key=lambda n: (loops[index[n]], depth[index[n]], index[n])))
 
 
-def _ranks_within(edges: list[tuple[int, int]], label: np.ndarray, n: int) -> list[int]:
+def _ranks_within(edges: Iterable[Edge], label: np.ndarray, n: int, joints: Iterable[int] = ()) -> list[int]:
+    """Return for each of `n` vertices the longest path of strongly connected components that ends at its own; those of
+    `joints` alone add nothing to it."""
     numbers = {int(value): i for i, value in enumerate(sorted(set(label.tolist())))}
-    short = [(numbers[int(label[a])], numbers[int(label[b])]) for a, b in edges if label[a] != label[b]]
-    ranks = _longest_paths(short, len(numbers))
-    return [ranks[numbers[int(label[i])]] for i in range(n)]
+    place = [numbers[int(value)] for value in label]
+    joined = set(joints)
+    light = {place[v] for v in joined} - {place[v] for v in range(n) if v not in joined}
+    short = [(place[a], place[b]) for a, b in edges if place[a] != place[b]]
+    ranks = _longest_paths(short, len(numbers), light)
+    return [ranks[p] for p in place]
 
 
 def levels(
@@ -96,34 +144,52 @@ def levels(
 ) -> tuple[dict[Signal, int], np.ndarray]:
     """Return the stage of every output (0: needs no input) and the places in u of the inputs that are in a
     loop."""
-    edges, inputs = _edges(links, outputs, components, dependencies)
+    edges, inputs, n = _edges(links, outputs, components, dependencies)
     if not edges:
         return dict.fromkeys(outputs, 0), np.array([], dtype=np.intp)
-    label = _components_of(edges, len(outputs))
-    rank = _ranks_within(edges, label, len(outputs))
+    label = _components_of(edges, n)
+    rank = _ranks_within(edges, label, n, range(len(outputs), n))
     # an output in a loop depends on inputs even if nothing outside feeds the loop
     looped = [label[a] == label[b] for a, b in edges]
     offset = 1 if any(flag and rank[a] == 0 for (a, _), flag in zip(edges, looped, strict=True)) else 0
     fed = {b for _, b in edges}
     level = {signal: rank[i] + (offset if i in fed else 0) for i, signal in enumerate(outputs)}
-    loop = sorted({i for i, flag in zip(inputs, looped, strict=True) if flag})
+    loop = sorted({i for i, flag in zip(inputs, looped, strict=True) if flag and i >= 0})
     return level, np.array(loop, dtype=np.intp)
 
 
 def _edges(
     links: list[Link], outputs: list[Signal], components: Mapping[str, Fmu], dependencies: Dependencies
-) -> tuple[list[tuple[int, int]], list[int]]:
-    """Return which output depends on which, by their numbers, and for each such pair the place in u it goes through."""
+) -> tuple[list[Edge], list[int], int]:
+    """Return which output depends on which, and for each such edge the place in u it goes through, or -1.
+
+    The edges of an output go through a joint, a vertex of its own for each set of inputs that outputs of a component depend
+    on; so there are as many as there are inputs and outputs, not the product of the two. The last number is that of all
+    vertices: the outputs, then the joints.
+    """
     place = {signal: i for i, signal in enumerate(outputs)}
     fed: dict[str, list[int]] = {}
     for i, link in enumerate(links):
         fed.setdefault(link.target[0], []).append(i)
+    joints: dict[tuple[str, frozenset[str] | None], int] = {}
     edges, inputs = [], []
     for component, name in outputs:
-        ports = components[component].ports
-        deps = dependencies[component].get(ports[name].variable)
-        for i in fed.get(component, []):
-            if deps is None or ports[links[i].target[1]].variable in deps:
-                edges.append((place[links[i].source], place[component, name]))
+        deps = dependencies[component].get(components[component].ports[name].variable)
+        key = component, deps
+        if key not in joints:
+            joints[key] = len(outputs) + len(joints)
+            for i in _depended(links, fed.get(component, []), components[component], deps):
+                edges.append((place[links[i].source], joints[key]))
                 inputs.append(i)
-    return edges, inputs
+        edges.append((joints[key], place[component, name]))
+        inputs.append(-1)
+    reached = {b for _, b in edges}
+    kept = [
+        j for j, (a, _) in enumerate(edges) if a < len(outputs) or a in reached
+    ]  # a joint that nothing feeds is none
+    return [edges[j] for j in kept], [inputs[j] for j in kept], len(outputs) + len(joints)
+
+
+def _depended(links: list[Link], fed: list[int], fmu: Fmu, deps: frozenset[str] | None) -> list[int]:
+    """Return those of the inputs `fed` of a component that are among `deps`; None: all of them."""
+    return [i for i in fed if deps is None or fmu.ports[links[i].target[1]].variable in deps]

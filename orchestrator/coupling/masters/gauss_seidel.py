@@ -45,7 +45,7 @@ class GaussSeidel(Master):
     def step(self, t: float, H: float) -> StepReport:
         """Advance all components from `t` to `t + H`."""
         graph = self.graph
-        graph.exchange_discrete()
+        graph.communicate()
         if self.history.order:
             self.history.append(t, graph.u)
             self.between.begin()

@@ -41,7 +41,7 @@ class InterfaceJacobian(Implicit):
 
     Parameters
     ----------
-    reuse : macro steps whose columns the inner iteration keeps
+    reuse : macro steps whose columns the inner iteration keeps, those of all its solves in a step
     difference : step of the differences, relative to the magnitude of the unknown (at least 1 in its unit)
     slow : outer iterations after which J is made anew
     inner_tolerance : residual of the inner iteration, relative to `tolerance`
@@ -70,8 +70,8 @@ class InterfaceJacobian(Implicit):
         max_iterations: PositiveCount = 10,
         **options: Any,
     ):
-        accelerator = LeastSquares(graph.torn.size, reuse, threshold, relaxation)
-        super().__init__(graph, accelerator, max_iterations=max_iterations, **options)
+        self.inner = LeastSquares(graph.torn.size, reuse, threshold, relaxation)
+        super().__init__(graph, self.inner, max_iterations=max_iterations, **options)
         self.difference, self.slow = difference, slow
         self.inner_tolerance, self.inner_iterations = inner_tolerance, inner_iterations
         self.models = [Model(graph, node, self.between) for node in graph.nodes if not node.forward.size and node.torn]
@@ -154,6 +154,7 @@ class InterfaceJacobian(Implicit):
                 x, solved = self._solve_interface(t, H, x, r, self.scale.norm(r, x, H), states)
                 if solved and enough():
                     break
+            self.inner.accept()
             return solved
         finally:
             self.graph.release(states)
@@ -163,7 +164,7 @@ class InterfaceJacobian(Implicit):
     ) -> tuple[np.ndarray, bool]:
         """Return the unknowns that meet the equation with the models, the best that were found, and whether they do;
         `residual` is the norm of `r`."""
-        inner, best = self.accelerator, (np.inf, x)
+        inner, best = self.inner, (np.inf, x)
         inner.begin(H, self.scale.values)
         # the models leave about `contraction` of the residual: to solve more exactly than they are is of no use
         target = self.inner_tolerance * max(self.tolerance, self.contraction * residual)
@@ -171,7 +172,7 @@ class InterfaceJacobian(Implicit):
             if residual < best[0]:
                 best = (residual, x + r)
             if residual <= target:
-                inner.accept()
+                inner.conclude()
                 return x, True
             x = inner.propose(x, r)
             try:

@@ -15,7 +15,8 @@ class Jacobi(Master):
 
     With p the polynomial of degree k through u(t), u(t - H), …, a component receives the mean of p over the
     step, and the slope 12/H² ∫ p (tau - t - H/2) dtau where it has an input
-    for it (``force_rate``). k = 0 is the classical held input.
+    for it (``force_rate``). k = 0 is the classical held input. Outputs that depend on inputs without a step are read at t + H
+    with the inputs of t + H (docs/concepts/masters.md has the algorithm, and what other engines do differently).
 
     Order: k + 1, but at most 2 where an FMU has no input for the slope. Stability: explicit; about H <
     2/omega of the stiffest coupling at k = 0, less for larger k; none without damping. When: coupling by
@@ -42,7 +43,7 @@ class Jacobi(Master):
 
     def step(self, t: float, H: float) -> StepReport:
         """Advance all components from `t` to `t + H`."""
-        self.graph.exchange_discrete()
+        self.graph.communicate()
         if self.history.order:
             self._extrapolate(t, H)
         self._step_all(t, H)

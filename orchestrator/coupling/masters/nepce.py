@@ -45,7 +45,7 @@ class Nepce(Jacobi):
     def step(self, t: float, H: float) -> StepReport:
         """Advance all components from `t` to `t + H`."""
         graph = self.graph
-        graph.exchange_discrete()
+        graph.communicate()
         true = graph.u.copy()
         self._extrapolate(t, H)
         base = graph.u.copy()

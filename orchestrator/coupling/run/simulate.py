@@ -8,8 +8,9 @@ from time import perf_counter
 
 import numpy as np
 
+from orchestrator.coupling.errors import digits
 from orchestrator.coupling.fmu.failure import TIMEOUT, FmuError
-from orchestrator.coupling.fmu.instance import Fmu
+from orchestrator.coupling.fmu.instance import ROUNDING, Fmu
 from orchestrator.coupling.fmu.sub_steps import check_steps
 from orchestrator.coupling.graph.graph import Graph
 from orchestrator.coupling.masters import made_for
@@ -56,10 +57,11 @@ def simulate(
         if the macro step does not divide the time, does not suit an FMU's internal step, or a signal or a master of
         that name does not exist
     """
-    n = _steps(start, stop, macro_step)
+    n, macro_step = steps_between(start, stop, macro_step)
     check_steps(graph.components, macro_step)
     master, recorder = made_for(graph, master), Recorder(graph, record)
     time, values = start + macro_step * np.arange(n + 1), np.full((n + 1, len(recorder.signals)), np.nan)
+    time[-1] = stop
     log = Log(master.NAME, macro_step, recorder.signals, time, values, units=recorder.units)
     simulation = _Simulation(graph, master, recorder, log, on_step)
     if timeout is None:
@@ -70,16 +72,17 @@ def simulate(
     return log
 
 
-def _steps(start: float, stop: float, H: float) -> int:
+def steps_between(start: float, stop: float, H: float) -> tuple[int, float]:
+    """Return the number of steps `H` from `start` to `stop` (s), and their length: `H`, or what its decimals are short for."""
     if not H > 0.0:
         raise ValueError(f"macro step {H:g} s: must be positive")
     if not stop > start:
-        raise ValueError(f"stop time {stop:g} s: must be after the start at {start:g} s")
-    n = round((stop - start) / H)
-    if n < 1 or abs(n * H - (stop - start)) > DIVIDES * (stop - start):
-        near = (stop - start) / max(n, 1)
-        raise ValueError(f"macro step {H:g} s does not divide {stop - start:g} s; {near:.6g} s does")
-    return n
+        raise ValueError(f"stop time {digits(stop)} s: must be after the start at {digits(start)} s")
+    n = max(round((stop - start) / H), 1)
+    even, error = (stop - start) / n, abs(n * H - (stop - start)) / (stop - start)
+    if error > DIVIDES:
+        raise ValueError(f"macro step {digits(H)} s does not divide {digits(stop - start)} s; {digits(even)} s does")
+    return n, H if error <= ROUNDING / 4 else even
 
 
 class _Simulation:

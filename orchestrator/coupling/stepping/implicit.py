@@ -14,6 +14,7 @@ from typing import Any, ClassVar
 
 import numpy as np
 
+from orchestrator.coupling.errors import digits
 from orchestrator.coupling.fmu.binding import ERROR, SavedState
 from orchestrator.coupling.fmu.failure import FmuError
 from orchestrator.coupling.graph.graph import Graph, Node
@@ -163,7 +164,7 @@ class Implicit(Master):
                     node.name,
                     t,
                     ERROR,
-                    f"the step of {H:.6g} s would have to be halved ({cause}), but {node.name} cannot vary its step; "
+                    f"the step of {digits(H)} s would have to be halved ({cause}), but {node.name} cannot vary its step; "
                     "choose a smaller macro step, or max_depth = 0 to go on with the best iterate",
                 )
 

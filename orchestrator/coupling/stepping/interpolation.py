@@ -6,7 +6,7 @@ from collections import deque
 
 import numpy as np
 
-from orchestrator.coupling.exchange import MEAN, RATE, exchange_named, is_load, is_motion
+from orchestrator.coupling.exchange import MEAN, RATE, exchange_named, is_motion
 from orchestrator.coupling.graph.graph import Graph, Node
 
 
@@ -52,8 +52,8 @@ class History:
 class Loads:
     """Which inputs are held as mean and slope over a step, and which a master may interpolate itself.
 
-    Names say it (`orchestrator.coupling.exchange`). A load is held as `value` + `rate` (tau - t - H/2), a motion is given
-    at the end of the step. Where a source feeds value *and* rate (or mean), it knows the course inside the step better
+    Names and units say it (`orchestrator.coupling.exchange`). A load is held as `value` + `rate` (tau - t - H/2), a motion
+    is given at the end of the step. Where a source feeds value *and* rate (or mean), it knows the course inside the step better
     than a master does: those inputs are passed on as they come. All others are values at an instant.
 
     Attributes
@@ -64,23 +64,23 @@ class Loads:
 
     def __init__(self, graph: Graph):
         rate, mean = graph.companion(RATE), graph.companion(MEAN)
-        names = set(graph.input_names)
-        loads = np.array([i for i, name in enumerate(graph.input_names) if is_load(name, names)], dtype=np.intp)
+        loads = np.flatnonzero((rate >= 0) & (mean < 0))
         self.fed = np.stack([loads, rate[loads]], axis=1)
         passed = np.zeros(graph.u.size, dtype=bool)
         for companion in (rate, mean):
             passed[companion >= 0] = True
             passed[companion[companion >= 0]] = True
-        for node in graph.nodes:  # who takes means rebuilds the course of all its inputs from their ends
+        for node in graph.nodes:  # who takes means rebuilds the course of its inputs from their ends, but for loads
             if _takes_means(node):
-                passed[node.first : node.first + len(node.inputs.names)] = True
+                own = np.arange(node.first, node.first + len(node.inputs.names))
+                passed[np.setdiff1d(own, graph.rate_of)] = True
         self.instant = np.flatnonzero(~passed)
 
 
 def _takes_means(node: Node) -> bool:
     """Return whether a component has inputs for the time means of others, and does not hold its inputs all the same."""
-    ports = node.fmu.ports
-    told = any(port.causality == "input" and is_motion(name, ports) for name, port in ports.items())
+    ports, names = node.fmu.ports, node.fmu.vocabulary
+    told = any(port.causality == "input" and is_motion(name, names) for name, port in ports.items())
     return told and not exchange_named(node.fmu.exchange).holds
 
 

@@ -96,6 +96,9 @@ class LeastSquares(Accelerator):
         self.reuse, self.threshold, self.relaxation = reuse, threshold, relaxation
         self.mixing, self.depth = mixing, depth
         self.past: deque[tuple[float, np.ndarray, np.ndarray]] = deque(maxlen=max(reuse, 1))
+        self.solved: list[
+            tuple[np.ndarray, np.ndarray]
+        ] = []  # columns of earlier solves of this step, the newest first
         self.n, self.H = n, 0.0
         self._allocate(2 * depth)
         self.begin(0.0, np.ones(n))
@@ -107,12 +110,13 @@ class LeastSquares(Accelerator):
     def reset(self) -> None:
         """Forget all columns."""
         self.past.clear()
+        self.solved.clear()
 
     def begin(self, H: float, scale: np.ndarray) -> None:
-        """Start a step: columns of earlier ones, of the same length, come after those of this one."""
+        """Start a step, or another solve of it: columns of earlier ones, of the same length, come after its own."""
         self.H, self.weights = H, 1.0 / scale
         self.new, self.last, self.columns = 0, None, 0
-        old = [(V, W) for length, V, W in self.past if length == H]
+        old = [*self.solved, *((V, W) for length, V, W in self.past if length == H)]
         need = self.depth + sum(len(V) for V, _ in old)
         if need > len(self.V):
             self._allocate(2 * need)
@@ -153,11 +157,20 @@ class LeastSquares(Accelerator):
         return proposed
 
     def accept(self) -> None:
-        """Keep the columns of the step."""
-        if self.reuse and self.new:
+        """Keep the columns of the step, those of all its solves; they count as one step."""
+        self.conclude()
+        if self.reuse and self.solved:
+            V, W = (np.concatenate(parts) for parts in zip(*self.solved, strict=True))
+            self.past.appendleft((self.H, V, W))
+        self.solved.clear()
+
+    def conclude(self) -> None:
+        """End one of several solves that the step takes: its columns serve the next one."""
+        if self.new:
             rows = slice(self.depth - self.new, self.depth)
-            self.past.appendleft((self.H, self.V[rows].copy(), self.W[rows].copy()))
+            self.solved.insert(0, (self.V[rows].copy(), self.W[rows].copy()))
+            self.new = 0
 
     def reject(self) -> None:
         """Forget everything: what did not converge was misled by it."""
-        self.past.clear()
+        self.reset()

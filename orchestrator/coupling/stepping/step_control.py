@@ -176,4 +176,4 @@ class Range:
 def _is_motion(graph: Graph, node: Node, name: str) -> bool:
     port = node.fmu.ports[name]
     moved = set(node.discrete_inputs.names) & (graph.feedthrough[node.name].get(port.variable) or frozenset())
-    return not node.forward.size and not moved and is_motion(name, node.fmu.ports)
+    return not node.forward.size and not moved and is_motion(name, node.fmu.vocabulary)
