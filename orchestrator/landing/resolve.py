@@ -204,7 +204,7 @@ def _mesh(scenario: LandingScenario, sources: Sources) -> dict[str, Value]:
         return {}
     wheels = scenario.landing.position + wheels_along(robot)
     tolerance = min([TOLERANCE, *(FOR_THE_MESH * allowed for allowed in scenario.simulation.tolerances.values())])
-    found = {f"landing[{k + 1}].position": float(y) for k, y in enumerate(wheels)}
+    found: dict[str, Value] = {f"landing[{k + 1}].position": float(y) for k, y in enumerate(wheels)}
     return found | {"landing_load": _weight(robot), MESH_TOLERANCE: tolerance}
 
 

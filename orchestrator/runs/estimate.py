@@ -150,9 +150,9 @@ def _of_mesh(coupled: Coupled, progress: Reached) -> Differences | None:
     by = left_out(finer.ratio)
     if system.problem() is None or finer.system.problem() is None:
         return _scaled(coupled, completed(finer.system, progress).table, by)
-    tables = [solved(one, coupled.table["time"], progress) for one in (system, finer.system)]
+    own, fine = (solved(one, coupled.table["time"], progress) for one in (system, finer.system))
     names = judged(coupled.table, coupled.scenario.simulation.tolerances)
-    return {name: by * value for name, value in differences(*tables, names).items()}
+    return {name: by * value for name, value in differences(own, fine, names).items()}
 
 
 def solved(system: System, times: np.ndarray, progress: Reached, tolerance: float = MESH_TOLERANCE) -> Table:

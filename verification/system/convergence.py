@@ -2,8 +2,9 @@
 
 The landing at 20 m over 5 s; each row changes one thing and gives the largest difference in Z and in roll over their
 peak to peak. The discretisation (mesh, tolerance, macro step) has an exact answer, from which the differences are
-taken: 240 elements as the mesh found by itself places them, a hundredth of the tolerance, the monolithic solution. The
-contact's stiffness and its reference length are assumed: their rows show what the assumption is worth, as a difference from the default.
+taken: 240 elements as the mesh found by itself places them, a hundredth of the tolerance, the monolithic solution.
+The contact's stiffness and its reference length are assumed: their rows show what the assumption is worth, as a
+difference from the default.
 """
 
 from __future__ import annotations
