@@ -11,8 +11,6 @@ from fmus.cable.ports import add_to_means, force_work, refusal, restart_means, s
 from fmus.cable.state import LAST_INNER, LAST_MACRO, NOT_CONVERGED, OK
 from fmus.kernels.jit import kernel
 
-CONVERGED = 1e-12
-"""Estimated remaining error of a coordinate, relative to the length of the cable over 200 m (1e-12 m there)."""
 MAX_HALVINGS = 12
 
 
@@ -24,10 +22,10 @@ def copy(source, target):
 
 
 @kernel
-def macro_step(model, collocation, alpha, use_alpha, state, h, longest, ports, shown, out, rows, work):
+def macro_step(model, collocation, alpha, use_alpha, state, h, longest, newton, ports, shown, out, rows, work):
     """Advance `state` by the macro step `h` with inner steps of at most `longest`, and write all outputs.
 
-    An inner step that does not converge is repeated at half its length, up to MAX_HALVINGS times.
+    Newton's method ends at an estimated error `newton` of a coordinate, for a cable of 200 m; relative to the length. An inner step that does not converge is repeated at half its length, up to MAX_HALVINGS times.
 
     Parameters
     ----------
@@ -42,7 +40,7 @@ def macro_step(model, collocation, alpha, use_alpha, state, h, longest, ports, s
     status = refusal(model, ports)
     if status != OK:
         return status
-    sums, tolerance = state[4 * model.weight.size :], CONVERGED * max(1.0, model.s[-1] / 200.0)
+    sums, tolerance = state[4 * model.weight.size :], newton * max(1.0, model.s[-1] / 200.0)
     restart_means(model, state, ports, work)
     inner = h / max(1.0, np.ceil(h / longest - 1e-9))
     lag = alpha.alpha_m - alpha.alpha_f

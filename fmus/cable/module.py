@@ -88,6 +88,13 @@ _PARAMETERS = [
     Variable("clamped", "parameter", "1", False, "supports hold the transverse slope too", kind="boolean"),
     parameter("integration_step", "s", 0.0025, "longest inner step", POSITIVE),
     parameter(
+        "newton_tolerance",
+        "m",
+        1e-12,
+        "estimated error of a coordinate at which Newton's method ends, for a cable of 200 m; proportional to the length",
+        Bounds(ge=1e-13, le=1e-6),
+    ),
+    parameter(
         "spectral_radius",
         "1",
         0.9,
@@ -289,6 +296,7 @@ class Cable:
             self.state,
             h,
             self["integration_step"],
+            self["newton_tolerance"],
             self._ports,
             self._shown_ports,
             self._shown,
