@@ -11,13 +11,18 @@ from typing import Any, Literal
 
 import numpy as np
 
-from orchestrator.coupling.errors import DONE, FAILED, INTERRUPTED, MISSED
+from orchestrator.coupling.errors import DONE, FAILED, FORWARD, INTERRUPTED, MISSED
 from orchestrator.coupling.run.results import Table
 from orchestrator.landing import audit
 
 Verdict = Literal["within", "missed", "failed", "interrupted"]
 EXIT_STATUS: dict[Verdict, int] = {"within": DONE, "missed": MISSED, "failed": FAILED, "interrupted": INTERRUPTED}
 """What the command line ends with."""
+SLOW, HELD, CHATTER = (
+    ("fixed_point", "aitken", "anderson", "semi_implicit"), ("jacobi", "gauss_seidel"), ("nepce", "reduced_interface")
+)  # fmt: skip
+"""Masters that another one is advised for (docs/notebook/masters.md): `iqn_ils` converges where those of the first group do
+not; those of the last chatter where those of the second do not."""
 CONSTANT = 1e-6
 """A signal that moves by less than this (m, rad …) counts as constant: errors are then held against this range, as for
 the roll of a landing at midspan, which is zero by symmetry."""
@@ -167,7 +172,7 @@ class Run:
         drift = self.energy.warning() if self.energy is not None else None
         lines = [self._unconverged()] if self.summary["unconverged_steps"] else []
         lines += [f"{contact}: the cable left the groove; the robot has fallen off" for contact in self.fallen]
-        lines += [drift] if drift is not None else []
+        lines += [f"{drift}{self._other_master()}"] if drift is not None else []
         lines += [f"{self.error}; the results up to there are kept"] if self.error else []
         return lines + ([f"no pictures: {self.manifest['pictures']}"] if self.manifest.get("pictures") else [])
 
@@ -178,8 +183,16 @@ class Run:
         return (
             f"{self.summary['unconverged_steps']} of {self.summary['steps']} macro steps did not converge, the first at "
             f"t = {steps['time'][first]:g} s (residual {steps['residual'][first]:.1e}); see iterations.csv, take a "
-            "smaller macro step or another implicit master"
+            f"smaller macro step{self._other_master()}"
         )
+
+    def _other_master(self) -> str:
+        """Return which master may do better at the same step; empty where there is none known."""
+        if self.master in SLOW:
+            return ", or iqn_ils"
+        if self.master in HELD:
+            return ", or iqn_ils if every FMU can save its state"
+        return f", or {FORWARD}" if self.master in CHATTER else ""
 
     def frame(self) -> Any:
         """Return the signals as a pandas ``DataFrame``, a row a communication point; `ImportError` without pandas."""
