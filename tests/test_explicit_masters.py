@@ -1,4 +1,7 @@
-"""The explicit masters: held against other engines, a loop over FMPy alone, closed forms, and the landing's reference."""
+"""The explicit masters, and what is advised where a state cannot be saved.
+
+Held against other engines, a loop over FMPy alone, closed forms, and the landing's reference.
+"""
 
 from __future__ import annotations
 
@@ -11,6 +14,10 @@ import fmpy
 import numpy as np
 import pytest
 
+import orchestrator
+from orchestrator.catalogue.library import robot_fmu
+from orchestrator.catalogue.robot_spec import load_robot
+from orchestrator.coupling.errors import FORWARD, InputError
 from orchestrator.coupling.fmu.instance import Fmu
 from orchestrator.coupling.graph.graph import Graph
 from orchestrator.coupling.graph.links import Connection
@@ -18,11 +25,12 @@ from orchestrator.coupling.masters import MASTERS
 from orchestrator.coupling.run.simulate import simulate
 from orchestrator.landing import monolithic
 from orchestrator.runs.components import opened
+from orchestrator.runs.result import CHATTER, HELD, SLOW, Run
 from orchestrator.runs.systems import resolve
 from tests.engines import ENGINES
 from tests.fmi import Instance
-from tests.fmus import build, compiled, fmu, needs_compiler
-from tests.scenarios import ROOT, scenario
+from tests.fmus import build, compiled, described, fmu, needs_compiler
+from tests.scenarios import LANDING, ROOT, scenario
 from tests.systems import closing
 
 H, N = 0.01, 50
@@ -141,3 +149,43 @@ def test_explicit_masters_land_equally_well_in_any_order(reference):
     assert np.all(jacobi < 1e-3)
     np.testing.assert_allclose(jacobi, gauss_seidel, rtol=0.1)
     np.testing.assert_allclose(contact_first, gauss_seidel, rtol=0.1)
+
+
+# -- what is advised ----------------------------------------------------------------------------------------------
+
+
+@pytest.fixture(scope="module")
+def forgetful(tmp_path_factory):
+    """The catalogue's robot as an FMU that cannot save its state."""
+    flag = ('canGetAndSetFMUstate="true"', 'canGetAndSetFMUstate="false"')
+    return described(robot_fmu(load_robot("fptlir")), tmp_path_factory.mktemp("robot"), flag)
+
+
+@pytest.mark.parametrize("master", ["iqn_ils", "interface_jacobian"])
+def test_a_robot_that_cannot_save_its_state_is_told_what_works(forgetful, master):
+    with pytest.raises(InputError) as told:
+        orchestrator.run(LANDING, robot=str(forgetful), master=master, stop=0.3, macro_step=0.001)
+    assert f"robot cannot save its state (canGetAndSetFMUstate is false); {FORWARD}" in str(told.value)
+
+
+def test_what_is_told_works(forgetful, reference):
+    """gauss_seidel at 1 ms: on the line, no drift of energy, z within the scenario's own tolerance."""
+    run = orchestrator.run(
+        LANDING, robot=str(forgetful), master="gauss_seidel", stop=0.3, macro_step=0.001, estimate="none"
+    )
+    assert run.verdict == "within" and run.warnings == []
+    exact = reference["robot.body.position.z"][::2]
+    z = run["robot.body.position.z"].values
+    assert np.max(np.abs(z - exact)) / np.ptp(exact) < run.tolerances["robot.body.position.z"]
+
+
+def test_advice_names_masters_that_there_are():
+    """Those that iterate well get none but a smaller step."""
+    assert {*SLOW, *HELD, *CHATTER} == set(MASTERS) - {"iqn_ils", "interface_jacobian"}
+    for master, said in (
+        ("gauss_seidel", ", or iqn_ils if every FMU can save its state"),
+        ("nepce", f", or {FORWARD}"),
+        ("aitken", ", or iqn_ils"),
+        ("iqn_ils", ""),
+    ):
+        assert Run({}, {}, {}, {"master": master}, {})._other_master() == said

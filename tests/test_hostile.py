@@ -10,6 +10,7 @@ import numpy as np
 import pytest
 
 from orchestrator.cli import commands as cli
+from orchestrator.coupling.errors import FORWARD
 from orchestrator.coupling.run.results import read_table
 from orchestrator.runs.coupled import run_coupled
 from orchestrator.scenario.read import load
@@ -59,10 +60,10 @@ FAULTS = [  # the numbers are those of tests/fmus/lag2.c
     ("iqn_ils", 5, LATER, "q, t = 0.05 s: the step of 0.01 s came back with pending"),
     ("jacobi", 10, LATER, "q, t = 0.05 s: output y is not a finite number; a smaller macro step may help"),
     ("iqn_ils", 10, LATER, "output y is not a finite number"),
-    ("interface_jacobian", 11, AT_ONCE, "its state is not saved completely; use an explicit master"),
-    ("reduced_interface", 11, AT_ONCE, "its state is not saved completely; use an explicit master"),
-    ("iqn_ils", 12, AT_ONCE, "restoring the state came back with error; take a master that never goes back"),
-    ("iqn_ils", 13, AT_ONCE, "saving the state came back with error; take a master that never goes back"),
+    ("interface_jacobian", 11, AT_ONCE, f"its state is not saved completely; {FORWARD}"),
+    ("reduced_interface", 11, AT_ONCE, f"its state is not saved completely; {FORWARD}"),
+    ("iqn_ils", 12, AT_ONCE, f"restoring the state came back with error; {FORWARD}"),
+    ("iqn_ils", 13, AT_ONCE, f"saving the state came back with error; {FORWARD}"),
     ("jacobi", 14, AT_ONCE, "q, t = 0 s: writing u came back with error"),
     ("jacobi", 15, AT_ONCE, "q, t = 0 s: initialisation came back with error"),
     ("jacobi", 16, AT_ONCE, "q, t = 0 s: end of initialisation came back with error"),

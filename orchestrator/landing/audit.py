@@ -104,7 +104,7 @@ class Audit:
         if not self.sources:
             return text
         worst = max(self.sources, key=lambda name: float(np.max(np.abs(self.sources[name]))))
-        cure = "take a smaller macro step or an implicit master" if "interface" in worst else "take smaller steps"
+        cure = "take a smaller macro step" if "interface" in worst else "take smaller steps"
         return f"{text}. Most of it comes from {worst}: {cure}"
 
 

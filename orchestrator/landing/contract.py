@@ -13,7 +13,7 @@ from typing import Any, Literal
 
 from fmus.module.variables import Causality, Variable
 from orchestrator.catalogue import modules as vocabulary
-from orchestrator.coupling.errors import InputError
+from orchestrator.coupling.errors import FORWARD, InputError
 from orchestrator.coupling.exchange import PARAMETER, suited_to
 
 Standing = Literal["ok", "missing", "wrong", "advice"]
@@ -239,7 +239,7 @@ def _capabilities(path: Path, description: Any) -> list[Finding]:
     return [
         Finding("co-simulation", "ok", f"FMI {description.fmiVersion}"),
         Finding("binary for this machine", "ok" if here else "missing", platform if here else f"has {platforms}"),
-        Finding("state can be saved", *_advised(rollback, "implicit masters need it; explicit ones do without")),
+        Finding("state can be saved", *_advised(rollback, f"implicit masters need it; {FORWARD}")),
         Finding("variable macro step", *_advised(variable, "sub-division of a macro step needs it")),
     ]
 

@@ -11,7 +11,7 @@ from typing import Any, Literal
 
 import numpy as np
 
-from orchestrator.coupling.errors import DONE, FAILED, INTERRUPTED, MISSED
+from orchestrator.coupling.errors import DONE, FAILED, FORWARD, INTERRUPTED, MISSED
 from orchestrator.coupling.run.results import Table
 from orchestrator.landing import audit
 from orchestrator.runs.errors import CURES, NAMES, Parts, missed
@@ -19,6 +19,11 @@ from orchestrator.runs.errors import CURES, NAMES, Parts, missed
 Verdict = Literal["within", "missed", "failed", "interrupted"]
 EXIT_STATUS: dict[Verdict, int] = {"within": DONE, "missed": MISSED, "failed": FAILED, "interrupted": INTERRUPTED}
 """What the command line ends with."""
+SLOW, HELD, CHATTER = (
+    ("fixed_point", "aitken", "anderson", "semi_implicit"), ("jacobi", "gauss_seidel"), ("nepce", "reduced_interface")
+)  # fmt: skip
+"""Masters that another one is advised for (docs/notebook/masters.md): `iqn_ils` converges where those of the first group do
+not; those of the last chatter where those of the second do not."""
 
 
 @dataclass(frozen=True, eq=False, repr=False)
@@ -172,7 +177,7 @@ class Run:
         lines = [self._unconverged()] if self.summary["unconverged_steps"] else []
         lines += [f"{contact}: the cable left the groove; the robot has fallen off" for contact in self.fallen]
         lines += [_unresolved(impact) for impact in self.summary.get("unresolved_impacts", [])]
-        lines += [drift] if drift is not None else []
+        lines += [f"{drift}{self._other_master()}"] if drift is not None else []
         lines += self.summary["warnings"]
         lines += [self._missed(name) for name in missed(self.error_parts, self.tolerances, self.table)]
         lines += [f"{self.error}; the results up to there are kept"] if self.error else []
@@ -191,8 +196,16 @@ class Run:
         return (
             f"{self.summary['unconverged_steps']} of {self.summary['steps']} macro steps did not converge, the first at "
             f"t = {steps['time'][first]:g} s (residual {steps['residual'][first]:.1e}); see iterations.csv, take a "
-            "smaller macro step or another implicit master"
+            f"smaller macro step{self._other_master()}"
         )
+
+    def _other_master(self) -> str:
+        """Return which master may do better at the same step; empty where there is none known."""
+        if self.master in SLOW:
+            return ", or iqn_ils"
+        if self.master in HELD:
+            return ", or iqn_ils if every FMU can save its state"
+        return f", or {FORWARD}" if self.master in CHATTER else ""
 
     def frame(self) -> Any:
         """Return the signals as a pandas ``DataFrame``, a row a communication point; `ImportError` without pandas."""

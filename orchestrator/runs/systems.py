@@ -25,7 +25,7 @@ from orchestrator.coupling.exchange import (
 from orchestrator.coupling.fmu.instance import Fmu
 from orchestrator.coupling.fmu.sub_steps import instance
 from orchestrator.coupling.graph.graph import Graph
-from orchestrator.coupling.graph.links import Connection
+from orchestrator.coupling.graph.links import Connection, owner_of, variable_of
 from orchestrator.coupling.graph.supply import Missing, Supply, chosen
 from orchestrator.coupling.masters import MASTERS
 from orchestrator.coupling.run.results import Table
@@ -152,10 +152,10 @@ class LandingSystem:
         contacts = [name for name in graph.components if name.startswith("contact")]
         foreign = {"cable": self.landing.cable.foreign, "robot": self.landing.robot.foreign}
         named = [*contacts, *(name for name, file in foreign.items() if file is not None)]
-        names = [n for n in graph.unfed if _owner(n) in named and not is_unused(_variable(n), len(contacts))]
+        names = [n for n in graph.unfed if owner_of(n) in named and not is_unused(variable_of(n), len(contacts))]
         lacks = zip(contacts, lacking(graph.components), strict=True)
         fallen = [_fallen_back(name, graph.components[name], self.exchange, what) for name, what in lacks]
-        return [*filter(None, fallen), *_unfed([n for n in names if not is_control(_variable(n))])]
+        return [*filter(None, fallen), *_unfed([n for n in names if not is_control(variable_of(n))])]
 
     def problem(self) -> Callable[[], Problem] | None:
         """Return what makes the monolithic problem; None where our modules cannot stand for a foreign FMU."""
@@ -323,14 +323,6 @@ def _fallen_back(name: str, fmu: Fmu, asked: str, lacks: Missing) -> str:
 def _unfed(names: Sequence[str]) -> list[str]:
     """Return the line that lists inputs which nothing feeds, x, y, z together; none if there is none."""
     return [f"inputs that nothing feeds keep their start values: {', '.join(stems(names))}"] if names else []
-
-
-def _owner(signal: str) -> str:
-    return signal.partition(".")[0]
-
-
-def _variable(signal: str) -> str:
-    return signal.partition(".")[2]
 
 
 def _scaled(section: Stepped, known: Variables, ratio: float) -> Stepped:

@@ -18,7 +18,7 @@ from typing import Any, Self
 import fmpy
 import numpy as np
 
-from orchestrator.coupling.errors import digits, nearest
+from orchestrator.coupling.errors import FORWARD, digits, nearest
 from orchestrator.coupling.exchange import PARAMETER
 from orchestrator.coupling.fmu.binding import (
     DISCARD,
@@ -40,7 +40,7 @@ from orchestrator.coupling.fmu.vocabulary import vocabulary_of
 
 logging.getLogger("fmus").addHandler(logging.NullHandler())  # what our FMUs say comes through FMI, like that of others
 
-SHORTER, FORWARD = "; a smaller macro step may help", "; take a master that never goes back, jacobi or gauss_seidel"
+SHORTER = "; a smaller macro step may help"
 EXCEPTION = re.compile(r"(\w+\.)*\w*(Error|Exception)\b")
 """How a line begins that names an exception of Python."""
 ROUNDING = 16 * np.finfo(float).eps
@@ -251,14 +251,14 @@ class Fmu:
         state = SavedState()
         status = self.fmi.get_state(state)
         if status > WARNING:
-            raise self.error(max(status, ERROR), "saving the state", FORWARD)
+            raise self.error(max(status, ERROR), "saving the state", f"; {FORWARD}")
         return state
 
     def restore(self, state: SavedState) -> None:
         """Go back to a saved state (inputs too)."""
         status = self.fmi.set_state(state)
         if status > WARNING:
-            raise self.error(max(status, ERROR), "restoring the state", FORWARD)
+            raise self.error(max(status, ERROR), "restoring the state", f"; {FORWARD}")
 
     def release(self, state: SavedState) -> None:
         """Free a saved state."""

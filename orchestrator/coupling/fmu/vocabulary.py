@@ -20,7 +20,7 @@ def vocabulary_of(description: ModelDescription, ports: Mapping[str, Port]) -> f
     ``X_rate`` is the slope of X if its unit is that of X per second, or if the FMU declares it as the derivative of X.
     ``X_mean`` is the mean of X unless both have units that differ.
     """
-    units = {unit.name: unit for unit in description.unitDefinitions}
+    units = {str(unit.name): unit for unit in description.unitDefinitions}
     declared = {v.name: v.derivative.name for v in description.modelVariables if v.derivative is not None}
     return frozenset(name for name, port in ports.items() if _is_meant(port, ports, units, declared))
 

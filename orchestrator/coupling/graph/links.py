@@ -11,10 +11,10 @@ from fmpy.model_description import Unit
 from orchestrator.coupling.errors import nearest
 from orchestrator.coupling.fmu.description import Port
 from orchestrator.coupling.fmu.instance import Fmu
+from orchestrator.coupling.fmu.vocabulary import EXPONENTS
 
 Signal = tuple[str, str]
 """Component and variable."""
-EXPONENTS = ("kg", "m", "s", "A", "K", "mol", "cd", "rad")
 CASTS = {("real", "real"), ("integer", "real"), ("integer", "integer"), ("boolean", "boolean"), ("string", "string")}
 
 
@@ -36,6 +36,16 @@ class Connection:
         if not (source and arrow and target):
             raise GraphError(f'connections: {text!r} is not of the form "a.x -> b.u"')
         return cls(source, target)
+
+
+def owner_of(signal: str) -> str:
+    """Return the component of ``component.variable``."""
+    return signal.partition(".")[0]
+
+
+def variable_of(signal: str) -> str:
+    """Return the variable of ``component.variable``."""
+    return signal.partition(".")[2]
 
 
 @dataclass

@@ -19,7 +19,7 @@ from orchestrator.coupling.exchange import (
     suffixed,
 )
 from orchestrator.coupling.fmu.instance import Fmu
-from orchestrator.coupling.graph.links import Connection, GraphError
+from orchestrator.coupling.graph.links import Connection, GraphError, owner_of, variable_of
 
 
 @dataclass(frozen=True)
@@ -59,9 +59,9 @@ class Supply:
         self.feeds: dict[str, str] = {}
         self.given: dict[str, list[Connection]] = {}
         for c in connections:
-            if _owner(c.source) in components and _owner(c.target) in components:
+            if owner_of(c.source) in components and owner_of(c.target) in components:
                 self.feeds[c.target] = c.source
-                self.given.setdefault(_owner(c.source), []).append(c)
+                self.given.setdefault(owner_of(c.source), []).append(c)
 
     def missing(self, name: str) -> Missing:
         """Return which slopes and means the exchange of a component lacks; what is coupled to nothing lacks nothing."""
@@ -69,7 +69,7 @@ class Supply:
         slopes = [
             _companion(c.target, RATE)
             for c in self.given.get(name, ())
-            if is_load(_variable(c.source), names)
+            if is_load(variable_of(c.source), names)
             and self.feeds.get(_companion(c.target, RATE)) != _companion(c.source, RATE)
         ]
         means = [f"{name}.{mean}" for mean in self._means(name)]
@@ -133,13 +133,5 @@ def _is_idle(component: str, name: str, fmu: Fmu, served: set[str]) -> bool:
     return False
 
 
-def _owner(signal: str) -> str:
-    return signal.partition(".")[0]
-
-
-def _variable(signal: str) -> str:
-    return signal.partition(".")[2]
-
-
 def _companion(signal: str, suffix: str) -> str:
-    return f"{_owner(signal)}.{suffixed(_variable(signal), suffix)}"
+    return f"{owner_of(signal)}.{suffixed(variable_of(signal), suffix)}"

@@ -4,6 +4,7 @@ from __future__ import annotations
 
 from typing import ClassVar
 
+from orchestrator.coupling.errors import FORWARD
 from orchestrator.coupling.graph.graph import Graph
 from orchestrator.coupling.graph.links import GraphError
 from orchestrator.coupling.stepping.parallel import Crew
@@ -46,6 +47,5 @@ def require_rollback(graph: Graph, master: str) -> None:
     stuck = [node.name for node in graph.nodes if not node.fmu.capabilities.rollback]
     if stuck:
         raise GraphError(
-            f"master {master}: {', '.join(stuck)} cannot save its state (canGetAndSetFMUstate is false); "
-            "choose an explicit master or reduced_interface"
+            f"master {master}: {', '.join(stuck)} cannot save its state (canGetAndSetFMUstate is false); {FORWARD}"
         )

@@ -7,6 +7,7 @@ from collections.abc import Iterable
 
 import numpy as np
 
+from orchestrator.coupling.errors import FORWARD
 from orchestrator.coupling.fmu.binding import ERROR
 from orchestrator.coupling.fmu.description import Port
 from orchestrator.coupling.fmu.failure import FmuError
@@ -49,5 +50,5 @@ def _compare(outputs: Group, t: float, first: np.ndarray, second: np.ndarray) ->
         t,
         ERROR,
         f"the same step from the same saved state gives {outputs.names[worst]} = {first[worst]:.9g}, then "
-        f"{second[worst]:.9g}: its state is not saved completely; use an explicit master",
+        f"{second[worst]:.9g}: its state is not saved completely; {FORWARD}",
     )
