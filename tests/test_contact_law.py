@@ -11,7 +11,7 @@ from scipy.optimize import brentq
 from scipy.spatial.transform import Rotation
 
 from fmus.contact import places as at
-from fmus.contact.law import LEFT, NODES, OPEN, SLIP, STICK, contact_wrench, law_parameters
+from fmus.contact.law import LEFT, NODES, OK, OPEN, SLIP, STEEP, STICK, contact_wrench, law_parameters
 from fmus.contact.module import Contact
 
 pytestmark = pytest.mark.portable
@@ -82,7 +82,7 @@ def reference_walls(motion, k=1e8, n=2.5, D=1.0, l0=0.06):
             total += np.concatenate([f * normal, np.cross((foot + x) * u, f * normal), [f]])
         return total
 
-    edges = np.linspace(-l0 / 2, l0 / 2, 13)
+    edges = np.linspace(-0.1, 0.1, 41)  # longer than what can touch
     return quad_vec(density, edges[0], edges[-1], epsabs=1e-9, epsrel=1e-11, points=edges, limit=4000)[0]
 
 
@@ -90,7 +90,7 @@ def test_seat_depth_of_a_point_contact():
     """Two walls at half the groove angle from the radial direction: W = 2 k delta^n sin(theta/2)."""
     weight = 38.0 * 9.8
     delta = (weight / (2.0 * 1e8 * SIN)) ** (1 / 2.5)
-    out = wrench(wheel_above(delta / SIN), max_contact_length=1e-7)
+    out = wrench(wheel_above(delta / SIN), max_contact_length=1e-7, reference_length=1e-7)
     assert out[at.WHEEL_FORCE + 2] == pytest.approx(weight, rel=1e-9)
     assert out[at.CABLE_FORCE + 2] == pytest.approx(-weight, rel=1e-9)
     assert out[at.NORMAL] == pytest.approx(weight / SIN, rel=1e-9)
@@ -129,14 +129,52 @@ def test_contact_length_is_that_of_the_geometry_and_grows():
         lengths.append(wrench(wheel_above(depth))[at.CONTACT_LENGTH])
         assert lengths[-1] == pytest.approx(2.0 * math.sqrt(SEAT**2 - (SEAT - depth) ** 2), rel=1e-9)
     assert lengths == sorted(lengths)
-    assert wrench(wheel_above(0.02))[at.CONTACT_LENGTH] == pytest.approx(0.06, rel=1e-12)
+    assert wrench(wheel_above(0.02), max_contact_length=0.06)[at.CONTACT_LENGTH] == pytest.approx(0.06, rel=1e-12)
     assert wrench(wheel_above(-1e-9))[at.CONTACT_LENGTH] == 0.0
+
+
+@settings(max_examples=60, deadline=None)
+@given(seed=st.integers(0, 2**32 - 1))
+def test_longest_contact_length_changes_nothing_beyond_what_touches(seed):
+    """An upper limit of 0.12 m is longer than the chord of the groove, 2 SEAT = 0.106 m; 5 m is no different."""
+    motion = random_motion(np.random.default_rng(seed), depth=0.01)
+    out = [wrench(motion, max_contact_length=length) for length in (0.12, 5.0)]
+    np.testing.assert_array_equal(out[0], out[1])
+    halved = wrench(motion, reference_length=0.12, friction_coefficient=0.0)
+    assert halved[at.NORMAL] == pytest.approx(0.5 * out[0][at.NORMAL], rel=1e-13)  # stiffness / l0 per unit length
+
+
+def test_resultants_of_the_walls():
+    """Seated in the middle, W = N sin(θ/2) presses towards the axle and nothing along it; on one wall alone the force
+    stands on that wall, N (sin(θ/2), ∓cos(θ/2))."""
+    out = wrench(wheel_above(2e-3), friction_coefficient=0.0, max_contact_length=1e-7)
+    assert out[at.RADIAL] == pytest.approx(SIN * out[at.NORMAL], rel=1e-12)
+    assert out[at.LATERAL] == pytest.approx(0.0, abs=1e-12 * out[at.NORMAL])
+    for side in (1.0, -1.0):
+        motion = wheel_above(-2e-3, lateral=side * 5e-3)
+        out = wrench(motion, friction_coefficient=0.0, max_contact_length=1e-7)
+        assert out[at.NORMAL] > 0.0
+        assert out[at.RADIAL] == pytest.approx(SIN * out[at.NORMAL], rel=1e-12)
+        assert abs(out[at.LATERAL]) == pytest.approx(COS * out[at.NORMAL], rel=1e-12)
+        axle, force = motion[at.AXLE : at.CENTRE_RATE], out[at.WHEEL_FORCE : at.WHEEL_MOMENT]
+        assert out[at.LATERAL] == pytest.approx(force @ axle, rel=1e-12)
+
+
+def test_a_cable_steeper_than_the_wall_is_refused():
+    """A wall stands at half the groove angle to the wheel's plane; a steeper cable has no end of its contact on it."""
+    for angle, expected in ((HALF - 0.01, OK), (HALF + 0.01, STEEP), (0.5 * math.pi, STEEP)):
+        motion = wheel_above(5e-3)
+        motion[at.TANGENT : at.POINT_RATE] = (math.sin(angle), math.cos(angle), 0.0)
+        out = np.zeros(at.OUT_SIZE)
+        assert contact_wrench(parameters(), motion, np.zeros(2), out) == expected
+        motion[at.CENTRE + 2] += 0.2  # in the air it may be turned as it likes
+        assert contact_wrench(parameters(), motion, np.zeros(2), out) == OK
 
 
 def test_lateral_self_centring():
     """Small lateral offset y of a point contact: F_y = -2 n k delta^(n-1) cos^2(theta/2) y on the cable."""
     delta, y = 4e-3, 1e-7
-    out = wrench(wheel_above(delta / SIN, lateral=y), max_contact_length=1e-7, friction_coefficient=0.0)
+    out = wrench(wheel_above(delta / SIN, lateral=y), max_contact_length=1e-7, reference_length=1e-7, friction_coefficient=0.0)
     assert out[at.CABLE_FORCE] == pytest.approx(-2.0 * 2.5 * 1e8 * delta**1.5 * COS**2 * y, rel=1e-6)
 
 
@@ -190,7 +228,8 @@ def test_never_pulls_and_dissipates(seed, damping):
 @settings(max_examples=200, deadline=None)
 @given(seed=st.integers(0, 2**32 - 1))
 def test_any_pose_gives_finite_passive_forces(seed):
-    """Wheels upside down, along the cable, through it: the law stays defined."""
+    """Wheels upside down, along the cable, through it: the law stays defined, or says that the cable is too steep to
+    the wall: from half the groove angle to the wheel's plane on."""
     rng = np.random.default_rng(seed)
     motion = rng.normal(size=24)
     motion[at.CENTRE : at.AXLE] = motion[at.POINT : at.TANGENT] + 0.05 * rng.normal(size=3)
@@ -199,9 +238,15 @@ def test_any_pose_gives_finite_passive_forces(seed):
         motion[at.AXLE : at.CENTRE_RATE] = motion[at.TANGENT : at.POINT_RATE] / np.linalg.norm(
             motion[at.TANGENT : at.POINT_RATE]
         )
-    out = wrench(motion, 1e-3 * rng.normal(size=2))
+    out = np.zeros(at.OUT_SIZE)
+    status = contact_wrench(parameters(), motion, 1e-3 * rng.normal(size=2), out)
+    tangent = motion[at.TANGENT : at.POINT_RATE]
+    steep = abs(tangent @ motion[at.AXLE : at.CENTRE_RATE]) / np.linalg.norm(tangent) >= SIN
+    assert status == OK or (status == STEEP and steep)
     assert np.isfinite(out).all()
-    assert out[at.NORMAL] >= 0.0 and out[at.WALL_POWER] >= 0.0 and 0.0 <= out[at.CONTACT_LENGTH] <= 0.06 * (1 + 1e-12)
+    if status == STEEP:
+        return
+    assert out[at.NORMAL] >= 0.0 and out[at.WALL_POWER] >= 0.0 and 0.0 <= out[at.CONTACT_LENGTH] <= 1.0
     about_wheel = out[at.CABLE_MOMENT : at.WHEEL_FORCE] + np.cross(
         motion[at.POINT : at.TANGENT] - motion[at.CENTRE : at.AXLE], out[at.CABLE_FORCE : at.CABLE_MOMENT]
     )
@@ -263,7 +308,7 @@ def test_restitution_of_hunt_crossley():
 
     For a point contact in the groove the walls' rate is sin(theta/2) of the radial speed: E = D sin(theta/2).
     """
-    prm, out, none = parameters(max_contact_length=1e-7, friction_coefficient=0.0), np.zeros(at.OUT_SIZE), np.zeros(2)
+    prm, out, none = parameters(max_contact_length=1e-7, reference_length=1e-7, friction_coefficient=0.0), np.zeros(at.OUT_SIZE), np.zeros(2)
 
     def fall(t, x):
         contact_wrench(prm, wheel_above(x[0], velocity=(0.0, 0.0, -x[1])), none, out)
@@ -303,7 +348,7 @@ def test_friction_sticks_up_to_the_coulomb_limit():
 def test_wedge_raises_sliding_friction():
     """Walls carry W = N sin(theta/2), friction is mu N: sliding takes mu / sin(theta/2) of the load."""
     motion = wheel_above(4e-3, slip_rate=(0.5, 0.0))
-    out = wrench(motion, (1.0, 0.0), max_contact_length=1e-7, damping=0.0)
+    out = wrench(motion, (1.0, 0.0), max_contact_length=1e-7, reference_length=1e-7, damping=0.0)
     assert out[at.STATUS] == SLIP
     assert -out[at.CABLE_FORCE + 1] / out[at.WHEEL_FORCE + 2] == pytest.approx(0.7 / SIN, rel=1e-9)
     assert out[at.FRICTION_POWER] == pytest.approx(-out[at.CABLE_FORCE + 1] * 0.5, rel=1e-12)

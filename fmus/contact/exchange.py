@@ -9,17 +9,21 @@ import math
 
 from fmus.contact import path as columns
 from fmus.contact import places as at
-from fmus.contact.law import LEFT, OK, SLIP, friction, walls
+from fmus.contact.law import LEFT, OK, SLIP, STEEP, friction, walls
 from fmus.contact.path import hermite_path, motion_at, path_work, rotation_given, straight_path, waveform_path
 from fmus.contact.sampling import (
+    bend,
     passed_axle,
     point_law,
     project_force,
     sample_law,
+    sample_walls,
     silence,
     slip_displacement,
     tangent_work,
 )
+from fmus.contact.within import DEPTH, FORCE, extremes, groove_depth, travel
+from fmus.contact.within import SLIP as FASTEST
 from fmus.kernels.jit import kernel
 
 POINT, WAVEFORM, HERMITE = 0, 1, 2
@@ -58,6 +62,7 @@ def write_instant(sample, outputs):
     outputs[at.O_LENGTH] = sample[at.CONTACT_LENGTH]
     outputs[at.O_STATUS] = sample[at.STATUS]
     outputs[at.O_STRAIN] = sample[at.WALL_ENERGY] + sample[at.BRISTLE_ENERGY]
+    outputs[at.O_RADIAL], outputs[at.O_LATERAL] = sample[at.RADIAL], sample[at.LATERAL]
 
 
 @kernel
@@ -67,6 +72,11 @@ def write_memory(state, outputs):
     outputs[at.O_DISSIPATED] = state[at.DISSIPATED]
     outputs[at.O_WORK_CABLE] = state[at.WORK_CABLE]
     outputs[at.O_WORK_WHEEL] = state[at.WORK_WHEEL]
+    outputs[at.O_IMPULSE], outputs[at.O_TOUCH_TIME] = state[at.IMPULSE], state[at.TOUCH_TIME]
+    # the inputs may be newer than the step
+    outputs[at.O_NORMAL_MAX] = max(state[at.NORMAL_MAX], outputs[at.O_NORMAL])
+    outputs[at.O_DEEPEST_MAX] = max(state[at.DEEPEST_MAX], outputs[at.O_DEEPEST])
+    outputs[at.O_SLIP_MAX] = state[at.SLIP_MAX]
 
 
 @kernel
@@ -86,7 +96,7 @@ def refresh(prm, inputs, state, motions, samples, outputs):
     """
     row, end, slip = samples[0], inputs[: at.MOTION_SIZE], samples[1, 0:2]
     status = walls(prm, end, row)
-    if status != OK:
+    if status != OK and not (status == STEEP and state[at.GONE] != 0.0):
         return status
     _slip_since(inputs, state, motions[0], samples[1, 2:5], slip)
     slip[0] += state[at.BRISTLE]
@@ -121,47 +131,54 @@ def _slip_since(inputs, state, start, rotation, slip):
 
 
 @kernel
-def step(prm, method, inputs, h, nodes, weights, increments, state, path, motions, samples, outputs):
-    """Advance the contact over one macro step; the inputs hold the motion at its end and the means over it.
+def step(prm, method, inputs, t, h, nodes, weights, increments, state, path, motions, samples, grid, way, outputs):
+    """Advance the contact from t over one macro step h; the inputs hold the motion at its end and the means over it.
 
     Parameters
     ----------
-    prm : (14,); method : 0 point, 1 waveform, 2 hermite; inputs : (45,); h : s
+    prm : (15,); method : 0 point, 1 waveform, 2 hermite; inputs : (45,); t, h : s
     nodes, weights, increments : of `gauss_rule(m)`
-    state : (38,), advanced; outputs : (35,), written
-    path, motions, samples : (4, 15), (m + 2, 24), (m + 1, 32) work space
+    state : (43,), advanced; outputs : (42,), written
+    path, motions, samples, grid : (2, 4, 15), (m + 2, 24), (m + 2, 34), (m + 5, 4) work space
+    way : (1,) m, receives how far wheel and cable move relative to each other in the step
 
     Returns
     -------
     int, status of the law
     """
+    if state[at.GONE] != 0.0:
+        return _fallen_step(prm, inputs, h, state, samples[0], outputs)
     m = len(nodes)
     start, end, last = motions[m + 1], inputs[: at.MOTION_SIZE], samples[m]
-    z = state[at.BRISTLE : at.BRISTLE + 2]
+    z, curvature = state[at.BRISTLE : at.BRISTLE + 2], inputs[at.CURVATURE : at.CURVATURE + 3]
+    exchanged, inside = path[0], path[1]
     start_motion(state, start)
-    if method == POINT:
-        straight_path(start, inputs, h, path)
-        status, dissipated = point_law(prm, path, h, start, end, z, state[at.SLIDES] != 0.0, last)
-    else:
-        if method == WAVEFORM:
-            waveform_path(start, inputs, path)
-        else:
-            hermite_path(start, inputs, h, path)
-        curvature = inputs[at.CURVATURE : at.CURVATURE + 3]
-        status, dissipated = sample_law(prm, path, h, nodes, weights, increments, end, curvature, z, motions, samples)
+    _rebuild(method, start, inputs, h, exchanged, inside)
+    way[0], status = travel(prm, inside, h, curvature, nodes, motions[0], samples[0], grid[0])
     if status != OK:
         return status
-    if state[at.GONE] != 0.0:
-        silence(last)
-        z[0] = z[1] = dissipated = 0.0
-    if method == POINT or state[at.GONE] != 0.0:
+    if method == POINT:
+        status, dissipated = point_law(prm, exchanged, h, start, end, z, state[at.SLIDES] != 0.0, last)
+        if status == OK:
+            status = sample_walls(prm, inside, h, nodes, curvature, motions, samples)
+    else:
+        status, dissipated = sample_law(prm, inside, h, nodes, weights, increments, end, curvature, z, motions, samples)
+    if status != OK:
+        return status
+    status = _look_back(prm, inside, t, h, nodes, weights, curvature, samples, grid, motions[0], state)
+    if status != OK:
+        return status
+    for i in range(m):  # the looks have used the first motion
+        motion_at(inside, nodes[i], h, motions[i])
+        bend(motions[i], curvature)
+    if method == POINT:
         _write_point(last, outputs)
     else:
         project_force(samples, nodes, weights, h, outputs)
-    work_cable = _work_on_cable(method, path, h, nodes, weights, motions, outputs)
-    work_wheel = path_work(path, columns.CENTRE, h, outputs, at.O_WHEEL)
-    work_wheel += path_work(path, columns.ROTATION, h, outputs, at.O_WHEEL + 3)
-    if state[at.GONE] == 0.0 and (last[at.STATUS] == LEFT or passed_axle(start, end)):
+    work_cable = _work_on_cable(method, exchanged, h, nodes, weights, motions, outputs)
+    work_wheel = path_work(exchanged, columns.CENTRE, h, outputs, at.O_WHEEL)
+    work_wheel += path_work(exchanged, columns.ROTATION, h, outputs, at.O_WHEEL + 3)
+    if last[at.STATUS] == LEFT or (way[0] <= groove_depth(prm) and passed_axle(start, end)):
         # what the walls and the bristle had stored is not given back
         state[at.GONE] = 1.0
         silence(last)
@@ -172,6 +189,50 @@ def step(prm, method, inputs, h, nodes, weights, increments, state, path, motion
     state[at.WORK_WHEEL] += work_wheel
     _remember(state, inputs, last, h)
     write_instant(last, outputs)
+    write_memory(state, outputs)
+    return OK
+
+
+@kernel
+def _rebuild(method, start, inputs, h, exchanged, inside):
+    """Write the path on which work is exchanged, and that along which the law is looked at: for `point` the cubic
+    through positions and velocities at both ends, else the same."""
+    if method == WAVEFORM:
+        waveform_path(start, inputs, inside)
+    else:
+        hermite_path(start, inputs, h, inside)
+    if method == POINT:
+        straight_path(start, inputs, h, exchanged)
+        return
+    for i in range(exchanged.shape[0]):
+        for j in range(exchanged.shape[1]):
+            exchanged[i, j] = inside[i, j]
+
+
+@kernel
+def _look_back(prm, path, t, h, nodes, weights, curvature, samples, grid, motion, state):
+    """Remember what has happened within the step from t; return the status of the law."""
+    best = grid[len(nodes) + 4]
+    status, impulse, touch = extremes(prm, path, h, nodes, weights, curvature, samples, grid, motion, best)
+    state[at.NORMAL_MAX], state[at.DEEPEST_MAX], state[at.SLIP_MAX] = best[FORCE], best[DEPTH], best[FASTEST]
+    state[at.IMPULSE] = impulse
+    if state[at.TOUCH_TIME] == at.NOT_YET and touch <= 1.0:
+        state[at.TOUCH_TIME] = t + touch * h
+    return status
+
+
+@kernel
+def _fallen_step(prm, inputs, h, state, row, outputs):
+    """Make a step of a contact that the cable has left: nothing acts."""
+    status = walls(prm, inputs[: at.MOTION_SIZE], row)
+    if status not in (OK, STEEP):
+        return status
+    silence(row)
+    _write_point(row, outputs)
+    state[at.NORMAL_MAX] = state[at.SLIP_MAX] = state[at.IMPULSE] = 0.0
+    state[at.DEEPEST_MAX] = row[at.DEEPEST]
+    _remember(state, inputs, row, h)
+    write_instant(row, outputs)
     write_memory(state, outputs)
     return OK
 

@@ -16,15 +16,16 @@ from fmus.module.variables import VariableTable
 
 OPEN, STICK, SLIP, LEFT = 0, 1, 2, 3
 """Status of a contact; `LEFT`: the cable has left the groove."""
-OK, NO_TANGENT, NO_AXLE, NOT_FINITE = 0, 1, 2, 3
-"""What the kernels return: done, or why the law cannot be evaluated."""
+OK, NO_TANGENT, NO_AXLE, NOT_FINITE, STEEP, TOO_FAR = range(6)
+"""What the kernels return: done, or why the law cannot be evaluated. `STEEP`: the cable presses on a wall, and it is
+steeper to the wheel's plane than the wall is. `TOO_FAR`: a step takes the wheel farther than the groove is deep."""
 
 NODES, WEIGHTS = np.polynomial.legendre.leggauss(9)
 """Gauss-Legendre rule on the piece of cable that a wall touches (relative error 4e-6 at n = 2.5)."""
 
 
 def law_parameters(values: np.ndarray, table: VariableTable) -> np.ndarray:
-    """Return the law's parameters ``prm`` from a module's flat array of values: (14,) float64."""
+    """Return the law's parameters ``prm`` from a module's flat array of values: (15,) float64."""
     prm = np.zeros(at.PRM_SIZE)
     prm[: len(at.PARAMETERS)] = values[table.indices(at.PARAMETERS)]
     half = 0.5 * prm[at.GROOVE_ANGLE]
@@ -105,41 +106,50 @@ def lateral(u, a):
 
 
 @kernel
-def _deepest(side, u_a, apart, prm):
-    """Return where on the line, from the foot, a wall is pressed deepest within the longest contact length.
+def _reach(u_a, y, prm):
+    """Return the ends, from the foot, of the piece of line that a wall can touch: inside the groove's rims.
 
-    The penetration is concave along the line while the angle between cable and wheel plane is below half the
-    groove angle; beyond, its end is deepest.
+    `max_contact_length` is an upper limit to it.
     """
-    half = 0.5 * prm[at.MAX_LENGTH]
-    slope = side * prm[at.COSINE] * u_a
-    room = prm[at.SINE] ** 2 - u_a * u_a
-    if room <= 0.0:
-        return half if slope > 0.0 else -half
-    radial = 1.0 - u_a * u_a
-    centre, closest = apart[0], apart[1]
-    x = centre + slope * closest / math.sqrt(radial * room)
-    return min(max(x, -half), half)
+    half, rim = 0.5 * prm[at.MAX_LENGTH], 0.5 * prm[at.GROOVE_WIDTH]
+    steep = abs(u_a)
+    if steep * half + abs(y) <= rim:
+        return -half, half
+    drift = y if u_a > 0.0 else -y
+    return max(-half, -(rim + drift) / steep), min(half, (rim - drift) / steep)
 
 
 @kernel
-def _touched(side, u_a, y, distance_squared, prm):
+def _deepest(side, u_a, apart, reach, prm):
+    """Return where on the line, from the foot, a wall is pressed deepest within `reach`.
+
+    The penetration is concave along the line while the angle between cable and wheel plane is below half the
+    groove angle; beyond, an end is deepest.
+    """
+    slope = side * prm[at.COSINE] * u_a
+    room = prm[at.SINE] ** 2 - u_a * u_a
+    if room <= 0.0:
+        return reach[1] if slope > 0.0 else reach[0]
+    radial = 1.0 - u_a * u_a
+    centre, closest = apart[0], apart[1]
+    x = centre + slope * closest / math.sqrt(radial * room)
+    return min(max(x, reach[0]), reach[1])
+
+
+@kernel
+def _touched(side, u_a, y, distance_squared, reach, prm):
     """Return the ends, from the foot, of the piece of line that touches a wall which is pressed somewhere.
 
-    delta > 0 means rho(x) < A + B x, a quadratic inequality. Where the cable is steeper than the wall (more
-    than half the groove angle off the wheel plane) the whole longest contact length is returned.
+    delta > 0 means rho(x) < A + B x, a quadratic inequality; the cable must not be steeper than the wall.
     """
-    half = 0.5 * prm[at.MAX_LENGTH]
     c = prm[at.COSINE] / prm[at.SINE]
     A = prm[at.APEX] + 0.5 * prm[at.CABLE_DIAMETER] / prm[at.SINE] + side * c * y
     B = side * c * u_a
     q2 = 1.0 - u_a * u_a - B * B
     q1 = y * u_a + A * B
     q0 = distance_squared - y * y - A * A
-    if q2 <= 1e-12:
-        return -half, half
     root = math.sqrt(max(q1 * q1 - q2 * q0, 0.0))
-    return max((q1 - root) / q2, -half), min((q1 + root) / q2, half)
+    return max((q1 - root) / q2, reach[0]), min((q1 + root) / q2, reach[1])
 
 
 @kernel
@@ -148,13 +158,13 @@ def walls(prm, motion, out):
 
     Parameters
     ----------
-    prm : (14,) of `law_parameters`
+    prm : (15,) of `law_parameters`
     motion : (24,) of cable point and wheel: places.py
-    out : (32,) as `contact_wrench`; friction's places are zero
+    out : (34,) as `contact_wrench`; friction's places are zero
 
     Returns
     -------
-    int, 0 or the cause of failure: 1 tangent without length, 2 axle without length, 3 motion not finite
+    int, OK or the cause of failure
     """
     for i in range(at.OUT_SIZE):
         out[i] = 0.0
@@ -203,15 +213,18 @@ def walls(prm, motion, out):
     sum_a = sum_ax = sum_r = sum_rx = sum_rxx = 0.0
     deepest = -math.inf
     first, last = math.inf, -math.inf
+    reach = _reach(u_a, y, prm) if not outside else (0.0, 0.0)
     for wall in range(2):
         side = 1.0 - 2.0 * wall
-        x = _deepest(side, u_a, (centre, closest), prm)
+        x = _deepest(side, u_a, (centre, closest), reach, prm)
         rho = math.sqrt(max(rr0 + x * (2.0 * rr1 + x * rr2), 0.0))
         delta = radius - s * (rho - prm[at.APEX]) + side * c * (y + x * u_a)
         deepest = max(deepest, delta)
         if delta <= 0.0 or outside:
             continue
-        lo, hi = _touched(side, u_a, y, distance_squared, prm)
+        if u_a * u_a >= s * s:
+            return STEEP
+        lo, hi = _touched(side, u_a, y, distance_squared, reach, prm)
         first, last = min(first, lo), max(last, hi)
         middle, half = 0.5 * (lo + hi), 0.5 * (hi - lo)
         for i in range(len(NODES)):
@@ -221,7 +234,7 @@ def walls(prm, motion, out):
             if delta <= 0.0:
                 continue
             rate = side * c * (va0 + x * va1) - s * (vr0 + x * (vr1 + x * vr2)) / rho
-            elastic = WEIGHTS[i] * half / prm[at.MAX_LENGTH] * k * _power(delta, n)
+            elastic = WEIGHTS[i] * half / prm[at.REFERENCE_LENGTH] * k * _power(delta, n)
             f = elastic * max(1.0 + damping * rate, 0.0)
             normal += f
             power += (f - elastic) * rate
@@ -233,7 +246,7 @@ def walls(prm, motion, out):
             sum_rx += radial * x
             sum_rxx += radial * x * x
 
-    out[at.DEEPEST] = deepest
+    out[at.DEEPEST] = min(deepest, 0.0) if outside else deepest  # beyond the rim there is no wall
     out[at.STATUS] = LEFT if left else OPEN
     if normal == 0.0 and energy == 0.0:
         return OK
@@ -256,6 +269,9 @@ def walls(prm, motion, out):
         out[at.CABLE_MOMENT + i] = on_cable[i]
         out[at.WHEEL_FORCE + i] = -force[i]
         out[at.WHEEL_MOMENT + i] = -(lever[i] + about_foot[i])
+    nearest = math.sqrt(max(rr0, 1e-24))
+    out[at.RADIAL] = (force[0] * r[0] + force[1] * r[1] + force[2] * r[2]) / nearest
+    out[at.LATERAL] = -_dot(force, a)
     out[at.NORMAL] = normal
     out[at.CONTACT_LENGTH] = last - first
     out[at.STATUS] = STICK if normal > 0.0 else OPEN
@@ -313,14 +329,14 @@ def contact_wrench(prm, motion, slip, out):
 
     Parameters
     ----------
-    prm : (14,) of `law_parameters`
+    prm : (15,) of `law_parameters`
     motion : (24,) of cable point and wheel: places.py
     slip : (2,) m, trial elongation of the friction bristle along the cable and along the axle
-    out : (32,) wrenches on cable and wheel, kinematics, powers and energies: places.py
+    out : (34,) wrenches on cable and wheel, kinematics, powers and energies: places.py
 
     Returns
     -------
-    int, 0 or the cause of failure: 1 tangent without length, 2 axle without length, 3 motion not finite
+    int, OK or the cause of failure: no length of tangent or axle, motion not finite, cable too steep to the wheel
     """
     status = walls(prm, motion, out)
     if status == OK:

@@ -8,9 +8,10 @@ import numpy as np
 
 from fmus.contact import exchange
 from fmus.contact import places as at
-from fmus.contact.law import NO_AXLE, NO_TANGENT, NOT_FINITE, OPEN, law_parameters
+from fmus.contact.law import NO_AXLE, NO_TANGENT, NOT_FINITE, OPEN, STEEP, TOO_FAR, law_parameters
 from fmus.contact.path import PATH_SHAPE
 from fmus.contact.sampling import gauss_rule
+from fmus.contact.within import N_LOOKS, groove_depth
 from fmus.module.variables import (
     NON_NEGATIVE,
     POSITIVE,
@@ -51,7 +52,10 @@ _PARAMETERS = [
     parameter("groove_width", "m", 0.08, "width of the groove at the rim", POSITIVE),
     parameter("cable_diameter", "m", 0.018, "diameter of the cable", POSITIVE),
     parameter(
-        "max_contact_length", "m", 0.06, "longest contact length l0; stiffness / l0 acts per unit length", POSITIVE
+        "reference_length", "m", 0.06, "length l0 that stiffness is of: stiffness / l0 acts per unit length", POSITIVE
+    ),
+    parameter(
+        "max_contact_length", "m", 1.0, "upper limit of the contact length, which the geometry gives", POSITIVE
     ),
     parameter("tangential_stiffness", "N/m", 1e6, "stiffness of the friction bristle before it slides", POSITIVE),
     parameter(
@@ -118,12 +122,13 @@ def _outputs(motion: tuple[str, ...]) -> list[Variable]:
     def real(name: str, unit: str, description: str, feedthrough: tuple[str, ...] = motion) -> Variable:
         return Variable(name, "output", unit, 0.0, description, feedthrough=feedthrough)
 
+    within = "within the last macro step (exchange point: along a cubic between its ends)"
     statuses = "0 open, 1 stick, 2 slip, 3 left the groove"
     return [
         *_wrench("cable", "cable.position", motion),
         *_wrench("wheel", "wheel.position", motion),
         Variable("cable.s", "output", "m", 0.0, "arc length of the contact point", discrete=True),
-        real("normal_force", "N", "sum of the forces of both groove walls"),
+        real("normal_force", "N", "sum of the forces of both groove walls, not their resultant"),
         real("friction_force", "N", "magnitude of the friction force"),
         real("penetration", "m", "deepest penetration; negative: the gap"),
         real("slip_velocity", "m/s", "speed of the cable point relative to the wheel"),
@@ -133,6 +138,13 @@ def _outputs(motion: tuple[str, ...]) -> list[Variable]:
         real("strain_energy", "J", "elastic energy of walls and friction bristle"),
         real("work_cable", "J", "work done on the cable, booked from what is exchanged", ()),
         real("work_wheel", "J", "work done on the wheel, booked from what is exchanged", ()),
+        real("radial_force", "N", "resultant of both walls on the wheel, from the cable towards the axle"),
+        real("lateral_force", "N", "resultant of both walls on the wheel, along its axle"),
+        real("normal_force_max", "N", f"largest normal force {within}"),
+        real("penetration_max", "m", f"deepest penetration {within}"),
+        real("slip_velocity_max", "m/s", f"largest slip velocity while cable and wheel touch, {within}", ()),
+        real("impulse", "N.s", "time integral of the normal force over the last macro step", ()),
+        real("touch_time", "s", "time of the first touch; -1 before", ()),
     ]
 
 
@@ -152,7 +164,7 @@ class Contact:
     TITLE = "Hunt-Crossley contact of a grooved wheel with a cable"
     table = _table()
     _INPUTS = slice(table.index["cable.position.x"], table.index["cable.curvature.z"] + 1)
-    _OUTPUTS = slice(table.index["cable.force.x"], table.index["work_wheel"] + 1)
+    _OUTPUTS = slice(table.index["cable.force.x"], table.index["touch_time"] + 1)
 
     def __init__(self) -> None:
         self.values = self.table.defaults()
@@ -164,17 +176,25 @@ class Contact:
         self._prm = law_parameters(self.values, self.table)
         self._method = int(self._value("exchange"))
         self._nodes, self._weights, self._increments = gauss_rule(SAMPLES)
-        self._path = np.zeros(PATH_SHAPE)
+        self._path = np.zeros((2, *PATH_SHAPE))
         self._motions = np.zeros((SAMPLES + 2, at.MOTION_SIZE))
-        self._samples = np.zeros((SAMPLES + 1, at.OUT_SIZE))
+        self._samples = np.zeros((SAMPLES + 2, at.OUT_SIZE))
+        self._grid = np.zeros((SAMPLES + 5, N_LOOKS))
+        self._way = np.zeros(1)
         self.state = np.zeros(at.STATE_SIZE)
         inputs = self.values[self._INPUTS]
         self.state[at.LAST : at.LAST + at.MOTION_SIZE] = inputs[: at.MOTION_SIZE]
         self.state[at.LAST_CURVATURE : at.LAST_CURVATURE + 3] = inputs[at.CURVATURE : at.CURVATURE + 3]
         self.state[at.ARC] = self._value("initial.s")
+        self.state[at.DEEPEST_MAX] = -math.inf
+        self.state[at.TOUCH_TIME] = at.NOT_YET
         self.refresh()
         outputs = self.values[self._OUTPUTS]
         self.state[at.STORED] = outputs[at.O_STRAIN]
+        self.state[at.NORMAL_MAX], self.state[at.DEEPEST_MAX] = outputs[at.O_NORMAL], outputs[at.O_DEEPEST]
+        if outputs[at.O_NORMAL] > 0.0:
+            self.state[at.SLIP_MAX], self.state[at.TOUCH_TIME] = outputs[at.O_SLIP], t
+            exchange.write_memory(self.state, outputs)
 
     def refresh(self) -> None:
         """Write the outputs at the instant of the inputs, with the state as it is."""
@@ -196,6 +216,7 @@ class Contact:
             self._prm,
             self._method,
             self.values[self._INPUTS],
+            t,
             h,
             self._nodes,
             self._weights,
@@ -204,9 +225,21 @@ class Contact:
             self._path,
             self._motions,
             self._samples,
+            self._grid,
+            self._way,
             self.values[self._OUTPUTS],
         )
+        if status == TOO_FAR:
+            raise ModuleError(self._too_far(t, h))
         self._raise(status, f" at t = {t + h:g} s")
+
+    def _too_far(self, t: float, h: float) -> str:
+        depth = groove_depth(self._prm)
+        return (
+            f"contact at t = {t:g} s: wheel and cable meet and move by {self._way[0]:.3g} m relative to each other "
+            f"within the step of {h:.3g} s, more than the groove is deep ({depth:.3g} m); take steps of at most "
+            f"{h * depth / self._way[0]:.2g} s, or an implicit master, which divides them"
+        )
 
     def _value(self, name: str) -> float:
         return float(self.values[self.table.index[name]])
@@ -226,5 +259,11 @@ class Contact:
             raise ModuleError(f"contact{when}: cable.tangent has no length; connect it to the cable's port")
         if status == NO_AXLE:
             raise ModuleError(f"contact{when}: wheel.axle has no length; connect it to the robot's wheel")
+        if status == STEEP:
+            raise ModuleError(
+                f"contact{when}: the cable presses on a groove wall and is steeper to the wheel's plane than the wall "
+                f"({0.5 * math.degrees(self._value('groove_angle')):.3g} degrees): the axle lies along the cable, which "
+                "the law does not cover; turn the robot's yaw, or stop the run earlier"
+            )
         if status == NOT_FINITE:
             raise ModuleError(f"contact{when}: the motion of cable or wheel is not finite; take a smaller macro step")

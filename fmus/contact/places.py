@@ -5,7 +5,7 @@ All places are the first of three components unless said otherwise. Vectors are 
 
 from __future__ import annotations
 
-# --- parameters of the law, ``prm`` (14,); the first eleven are parameters of the module, in this order
+# --- parameters of the law, ``prm`` (15,); the first twelve are parameters of the module, in this order
 PARAMETERS = (
     "stiffness",
     "exponent",
@@ -15,6 +15,7 @@ PARAMETERS = (
     "groove_angle",
     "groove_width",
     "cable_diameter",
+    "reference_length",
     "max_contact_length",
     "tangential_stiffness",
     "tangential_damping",
@@ -28,14 +29,15 @@ PARAMETERS = (
     GROOVE_ANGLE,
     GROOVE_WIDTH,
     CABLE_DIAMETER,
+    REFERENCE_LENGTH,
     MAX_LENGTH,
     TANGENTIAL_STIFFNESS,
     TANGENTIAL_DAMPING,
     SINE,  # of half the groove angle
     COSINE,
     APEX,  # radius of the groove's apex, m
-) = range(14)
-PRM_SIZE = 14
+) = range(15)
+PRM_SIZE = 15
 
 # --- motion (24,): the cable's part 0:12, the wheel's 12:24
 POINT = 0  # of the cable, at the contact's arc length, m
@@ -49,7 +51,7 @@ CENTRE_RATE = 18
 TURN_RATE = 21  # angular velocity of the wheel, rad/s
 MOTION_SIZE = 24
 
-# --- what the law says at one instant, ``out`` (32,)
+# --- what the law says at one instant, ``out`` (34,)
 CABLE_FORCE = 0  # on the cable, N
 CABLE_MOMENT = 3  # on the cable about its point, N m
 WHEEL_FORCE = 6
@@ -67,8 +69,10 @@ WALL_POWER = 23  # one number, W, dissipated
 FRICTION_POWER = 24  # one number, W, dissipated
 WALL_ENERGY = 25  # one number, J, elastic
 BRISTLE_ENERGY = 26  # one number, J, elastic
-SCRATCH = 27  # from here on free for whoever calls the law
-OUT_SIZE = 32
+RADIAL = 27  # one number, N: of both walls on the wheel, from the cable towards the axle
+LATERAL = 28  # one number, N: of both walls on the wheel, along its axle
+SCRATCH = 29  # from here on free for whoever calls the law
+OUT_SIZE = 34
 
 # --- inputs of the module (45,): the motion at the end of the macro step, then
 MEANS = 24  # time means of point, tangent, centre and axle
@@ -77,7 +81,7 @@ ROTATION_MEAN = 39
 CURVATURE = 42  # d²r/ds² of the cable at its point, 1/m
 INPUT_SIZE = 45
 
-# --- state of the module (38,)
+# --- state of the module (43,)
 LAST = 0  # motion at the last communication point, as it came in
 BRISTLE = 24  # two numbers, m: elongation
 ARC = 26  # one number, m: arc length of the contact point
@@ -90,11 +94,19 @@ SLIDES = 32  # 1 if the bristle slides at the last communication point
 GONE = 33  # 1 once the cable has left the groove
 LAST_STEP = 34  # one number, s: length of the last macro step
 LAST_CURVATURE = 35  # of the cable at the last communication point, 1/m
-STATE_SIZE = 38
+NORMAL_MAX = 38  # one number, N: largest within the last macro step
+DEEPEST_MAX = 39  # one number, m
+SLIP_MAX = 40  # one number, m/s, while cable and wheel touch
+IMPULSE = 41  # one number, N s: of the normal force over the last macro step
+TOUCH_TIME = 42  # one number, s: of the first touch; NOT_YET before
+STATE_SIZE = 43
+NOT_YET = -1.0
 
-# --- outputs of the module (35,)
+# --- outputs of the module (42,)
 O_CABLE = 0  # force, moment, force rate, moment rate on the cable
 O_WHEEL = 12
 O_ARC, O_NORMAL, O_FRICTION, O_DEEPEST, O_SLIP, O_LENGTH, O_STATUS = range(24, 31)
 O_DISSIPATED, O_STRAIN, O_WORK_CABLE, O_WORK_WHEEL = range(31, 35)
-OUTPUT_SIZE = 35
+O_RADIAL, O_LATERAL = 35, 36
+O_NORMAL_MAX, O_DEEPEST_MAX, O_SLIP_MAX, O_IMPULSE, O_TOUCH_TIME = range(37, 42)
+OUTPUT_SIZE = 42

@@ -46,7 +46,7 @@ def sample_law(prm, path, h, nodes, weights, increments, end, curvature, z, moti
     end : (24,) motion at the end of the step
     curvature : (3,) of the cable, 1/m
     z : (2,) bristle at the start; becomes that at the end
-    motions, samples : (m + 1, 24) and (m + 1, 32), written
+    motions, samples : (m + 1, 24) and (m + 1, 34), written; may be longer
 
     Returns
     -------
@@ -72,9 +72,21 @@ def sample_law(prm, path, h, nodes, weights, increments, end, curvature, z, moti
 
 
 @kernel
+def sample_walls(prm, path, h, nodes, curvature, motions, samples):
+    """Write the motions and what the walls do at the Gauss points of a path; return the status of the law."""
+    for i in range(len(nodes)):
+        motion_at(path, nodes[i], h, motions[i])
+        bend(motions[i], curvature)
+        status = walls(prm, motions[i], samples[i])
+        if status != OK:
+            return status
+    return OK
+
+
+@kernel
 def _lead_bristle(prm, h, increments, i, z, motions, samples):
     """Lead the bristle `z` (2,) on to sample i by the slip since the sample before, and add the friction there."""
-    m = samples.shape[0] - 1
+    m = len(increments)
     trial, slip = samples[m, at.SCRATCH : at.SCRATCH + 2], at.SLIP_VELOCITY
     trial[0], trial[1] = z[0], z[1]
     for j in range(m):

@@ -8,19 +8,25 @@ from fmus.cable.assembly import interpolate
 from fmus.contact import law
 from fmus.contact import places as at
 from fmus.contact.sampling import silence
+from fmus.contact.within import groove_depth
 from fmus.kernels.jit import kernel
 from fmus.robot import rigid_body as rb
+from orchestrator.landing.monolithic.looks import see
 from orchestrator.landing.monolithic.state import (
     ARC,
+    AXLE_ALONG,
     BRISTLE,
     CONTACT_FAILED,
     EXCESS,
     FRICTION_LOSS,
     GONE,
+    IMPULSE,
     OFF_CABLE,
     OK,
+    RADIAL,
     REGIME,
     STORED,
+    TIME,
     WALL_LOSS,
 )
 
@@ -29,14 +35,18 @@ FOOT_ITERATIONS = 2
 
 
 @kernel
-def walls(system, robot, points, outs, space):
-    """Evaluate the walls of all contacts at one instant; return the status of the law."""
+def walls(system, robot, points, contacts, outs, space):
+    """Evaluate the walls of all contacts at one instant; return OK, CONTACT_FAILED or AXLE_ALONG."""
     motion = space.motion
     for k in range(system.contacts.shape[0]):
         for i in range(at.WHEEL):
             motion[i] = points[k, i]
         rb.wheel_motion(system.robot, robot, k, motion[at.WHEEL :])
-        if law.walls(system.contacts[k], motion, outs[k]) != law.OK:
+        status = law.walls(system.contacts[k], motion, outs[k])
+        if status == law.STEEP:
+            if contacts[k, GONE] == 0.0:
+                return AXLE_ALONG
+        elif status != law.OK:
             return CONTACT_FAILED
     return OK
 
@@ -128,14 +138,38 @@ def settle(system, state, move, space, work):
         space.trial[k, 0], space.trial[k, 1] = state.contacts[k, BRISTLE], state.contacts[k, BRISTLE + 1]
     status = follow(system, q, state.robot, arcs, space, work.shape) if move else OK
     cable_points(system, q, v, arcs, space.cable_point, work.shape)
-    if walls(system, state.robot, space.cable_point, space.out[0], space) != OK:
-        return CONTACT_FAILED
+    found = walls(system, state.robot, space.cable_point, state.contacts, space.out[0], space)
+    if found != OK:
+        return found
     loads(system, state.robot, space.cable_point, space.trial, state.contacts, space.out[0], space.generalized, space)
     if move:
         for k in range(arcs.size):
             state.contacts[k, REGIME] = _regime(system.contacts[k], space.out[0, k])
-            _remember(state.contacts[k], space.out[0, k], arcs[k])
+            passed = face(system, state, k, space)
+            _remember(state.contacts[k], space.out[0, k], arcs[k], passed)
+            see(state.contacts[k], space.out[0, k], state.contacts[k, TIME])
     return status
+
+
+@kernel
+def face(system, state, k, space):
+    """Remember in which direction wheel k has the cable; return whether that has turned round since it was last seen.
+
+    The wheel has then gone through the cable.
+    """
+    motion = space.motion
+    for i in range(at.WHEEL):
+        motion[i] = space.cable_point[k, i]
+    rb.wheel_motion(system.robot, state.robot, k, motion[at.WHEEL :])
+    _length, _u, _offset, d = law.foot(motion)
+    a = law.axle(motion)
+    y = d[0] * a[0] + d[1] * a[1] + d[2] * a[2]
+    across = 0.0
+    for i in range(3):
+        radial = d[i] - y * a[i]
+        across += radial * state.contacts[k, RADIAL + i]
+        state.contacts[k, RADIAL + i] = radial
+    return across < 0.0
 
 
 @kernel
@@ -151,8 +185,8 @@ def _regime(prm, out):
 
 
 @kernel
-def _remember(memory, out, arc):
-    """Renew the memory of a contact from the law's results at the end of a step.
+def _remember(memory, out, arc, passed):
+    """Renew the memory of a contact from the law's results at the end of a step; whether it `passed` through the cable.
 
     What the walls had stored when the cable left the groove is not given back.
     """
@@ -160,7 +194,7 @@ def _remember(memory, out, arc):
     memory[FRICTION_LOSS] -= out[at.BRISTLE_ENERGY]
     if memory[GONE] > 0.0:
         return
-    if out[at.STATUS] == law.LEFT:
+    if out[at.STATUS] == law.LEFT or passed:
         memory[GONE] = 1.0
         memory[WALL_LOSS] += memory[STORED]
     memory[STORED] = out[at.WALL_ENERGY]
@@ -179,10 +213,13 @@ def end(system, state, h, space, work):
             out, weight = space.out[j, k], h * method.b[j]
             memory[REGIME + 1 + j] = _regime(system.contacts[k], out)
             memory[WALL_LOSS] += weight * out[at.WALL_POWER]
+            memory[IMPULSE] += weight * out[at.NORMAL]
+            see(memory, out, memory[TIME] + method.c[j] * h)
             along = out[at.FRICTION] * out[at.SLIP_VELOCITY]
             memory[FRICTION_LOSS] -= weight * (along + out[at.FRICTION + 1] * out[at.SLIP_VELOCITY + 1])
             memory[BRISTLE] += weight * space.slip[j, k, 0]
             memory[BRISTLE + 1] += weight * space.slip[j, k, 1]
+        memory[TIME] += h
     return settle(system, state, True, space, work)
 
 
@@ -199,3 +236,18 @@ def changed(state, space):
         if space.out[0, k, at.STATUS] == law.SLIP and space.out[0, k, EXCESS] < space.out[1, k, EXCESS]:
             return True
     return False
+
+
+@kernel
+def longest_step(system, state, space):
+    """Return in which time (s) no wheel moves farther from its cable point, or nearer to it, than half its groove's
+    depth."""
+    longest, motion = np.inf, space.motion
+    for k in range(system.contacts.shape[0]):
+        rb.wheel_motion(system.robot, state.robot, k, motion[at.WHEEL :])
+        square = 0.0
+        for i in range(3):
+            square += (motion[at.CENTRE_RATE + i] - space.cable_point[k, at.POINT_RATE + i]) ** 2
+        if square > 0.0:
+            longest = min(longest, 0.5 * groove_depth(system.contacts[k]) / np.sqrt(square))
+    return longest

@@ -5,6 +5,7 @@ from __future__ import annotations
 import numpy as np
 
 from fmus.kernels.jit import kernel
+from orchestrator.landing.monolithic.contacts import longest_step
 from orchestrator.landing.monolithic.state import NOT_CONVERGED, OFF_CABLE, OK
 from orchestrator.landing.monolithic.step import step
 
@@ -26,12 +27,13 @@ def advance(system, state, control, t, end, space, work):
 
     Returns
     -------
-    status : OK, NOT_CONVERGED where no step is short enough, or OFF_CABLE
+    status : OK, OFF_CABLE, or why no step is short enough: NOT_CONVERGED, CONTACT_FAILED, AXLE_ALONG
     t : time reached
     """
     while end - t > 1e-12 * max(1.0, end):
         left = end - t
-        h = left / max(1.0, np.ceil(left / min(control[WANTED], control[LONGEST]) - 1e-9))
+        longest = min(control[WANTED], control[LONGEST], longest_step(system, state, space))
+        h = left / max(1.0, np.ceil(left / longest - 1e-9))
         fresh = abs(h - control[MATRIX]) > 1e-9 * h
         status, error, iterations = step(
             system, state, h, control[NEWTON], fresh, space, work, control[ALLOWED], control[EVENT]
@@ -47,7 +49,7 @@ def advance(system, state, control, t, end, space, work):
             control[MATRIX] = 0.0
             control[REJECTED] += 1.0
             if control[WANTED] < SHORTEST:
-                return NOT_CONVERGED, t
+                return status if status != OK else NOT_CONVERGED, t
             continue
         t += h
         control[STEPS] += 1.0

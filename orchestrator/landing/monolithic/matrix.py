@@ -13,7 +13,7 @@ from fmus.kernels.jit import kernel
 from fmus.robot import rigid_body as rb
 from orchestrator.landing.monolithic.contacts import cable_points, loads, walls
 from orchestrator.landing.monolithic.robot import perturb
-from orchestrator.landing.monolithic.state import CONTACT_FAILED, N_ROBOT, NOT_CONVERGED, OK
+from orchestrator.landing.monolithic.state import N_ROBOT, NOT_CONVERGED, OK
 
 RATE_STEP, STEP = 1e-6, 1e-8
 """Steps of the differences: m/s and rad/s, m and rad."""
@@ -25,8 +25,9 @@ def make(system, robot, q, v, contacts, arcs, h, space, work):
     model, n_wheels = system.model, system.contacts.shape[0]
     z = h * system.method.eigenvalue
     cable_points(system, q, v, arcs, space.cable_point, work.shape)
-    if _interface_tangent(system, robot, space.cable_point, space.elongation, contacts, space) != OK:
-        return CONTACT_FAILED
+    status = _interface_tangent(system, robot, space.cable_point, space.elongation, contacts, space)
+    if status != OK:
+        return status
     iteration_matrix(model, q, v, 1.0 + 0.0j, z, z * z, work.band, work.matrix, work.element)
     space.coupling[:, :] = 0.0
     for k in range(n_wheels):
@@ -48,8 +49,9 @@ def _interface_tangent(system, robot, points, slips, contacts, space):
     """
     n_wheels = system.contacts.shape[0]
     outs, value, base = space.out[0], space.generalized, space.reference
-    if walls(system, robot, points, outs, space) != OK:
-        return CONTACT_FAILED
+    status = walls(system, robot, points, contacts, outs, space)
+    if status != OK:
+        return status
     base_slip = space.slip[0]
     for k in range(n_wheels):
         for i in range(2):
@@ -60,8 +62,9 @@ def _interface_tangent(system, robot, points, slips, contacts, space):
         step = RATE_STEP if rate else STEP
         for column in range(value.size):
             _probe(robot, points, column, step, rate, space)
-            if walls(system, space.probe, space.probe_point, outs, space) != OK:
-                return CONTACT_FAILED
+            status = walls(system, space.probe, space.probe_point, contacts, outs, space)
+            if status != OK:
+                return status
             for k in range(n_wheels):
                 for i in range(2):
                     if rate:

@@ -22,15 +22,20 @@ from fmus.robot import rigid_body as rb
 from fmus.robot.module import Robot, body_parameters, initial_state
 from orchestrator.coupling.exchange import only_couples
 from orchestrator.landing.monolithic import control as steps
-from orchestrator.landing.monolithic.contacts import settle
+from orchestrator.landing.monolithic.contacts import face, settle
+from orchestrator.landing.monolithic.looks import begin, restart
 from orchestrator.landing.monolithic.state import (
     ARC,
+    AXLE_ALONG,
     FRICTION_LOSS,
     GONE,
     N_CONTACT,
     N_ROBOT,
+    NORMAL_MAX,
     OFF_CABLE,
     OK,
+    TIME,
+    TOUCH_TIME,
     WALL_LOSS,
     State,
     System,
@@ -87,9 +92,12 @@ class Integrator:
     Parameters
     ----------
     refinement : the intervals between output times are divided into at least so many steps, or a multiple of it
+    start_time : s
     """
 
-    def __init__(self, problem: Problem, tolerance: float = TOLERANCE, refinement: int = 1):
+    def __init__(
+        self, problem: Problem, tolerance: float = TOLERANCE, refinement: int = 1, start_time: float = 0.0
+    ):
         self.problem = problem
         cable, robot = problem.cable, problem.robot
         self.method = collocation(cable["spectral_radius"])
@@ -109,6 +117,10 @@ class Integrator:
         self.control = np.array([0.02 * self.longest, self.longest, tolerance, event, NEWTON, 0.0, 0.0, 0.0, 0.0])
         if settle(self.system, self.state, False, self.space, self.work) != OK:
             raise ModuleError("monolithic: the contact law fails at the start; check the initial pose of the robot")
+        for k in range(n_wheels):
+            begin(memory[k], self.space.out[0, k], start_time)
+            memory[k, TIME] = start_time
+            face(self.system, self.state, k, self.space)
 
     @property
     def steps(self) -> int:
@@ -124,6 +136,12 @@ class Integrator:
             raise ModuleError(
                 f"monolithic: a wheel has run past a support, off the cable, at t = {reached:g} s; "
                 "stop the run earlier, or brake the robot"
+            )
+        if status == AXLE_ALONG:
+            raise ModuleError(
+                f"monolithic at t = {reached:g} s: the cable presses on a groove wall and is steeper to the wheel's plane "
+                "than the wall: the axle lies along the cable, which the law does not cover; turn the robot's yaw, or "
+                "stop the run earlier"
             )
         if status != OK:
             raise ModuleError(
@@ -143,6 +161,9 @@ def _contact_signals(out: np.ndarray, memory: np.ndarray) -> tuple[float, ...]:
         memory[WALL_LOSS] + memory[FRICTION_LOSS],
         out[at.WALL_ENERGY] + out[at.BRISTLE_ENERGY],
         memory[ARC],
+        0.0 if memory[GONE] else out[at.RADIAL],
+        0.0 if memory[GONE] else out[at.LATERAL],
+        *memory[NORMAL_MAX : TOUCH_TIME + 1],
     )
 
 
@@ -170,6 +191,13 @@ class _Recorder:
         "dissipated_energy",
         "strain_energy",
         "cable.s",
+        "radial_force",
+        "lateral_force",
+        "normal_force_max",
+        "penetration_max",
+        "slip_velocity_max",
+        "impulse",
+        "touch_time",
     )
 
     def __init__(self, integrator: Integrator, n: int):
@@ -202,6 +230,7 @@ class _Recorder:
             loads = self.cable.values[first + ports.FORCE : first + ports.FORCE_RATE]
             loads[:] = 0.0 if memory[GONE] else row[at.CABLE_FORCE : at.WHEEL_FORCE]
             self.contact_rows[i, k] = _contact_signals(row, memory)
+            restart(memory)
         self.cable.state[:] = state.cable
         self.cable.show()
         self.cable_rows[i] = self.cable.values[self.cable_at]
@@ -238,7 +267,7 @@ def integrate(
     progress : called with the time reached
     refinement : see `Integrator`
     """
-    integrator = Integrator(make(), tolerance, refinement)
+    integrator = Integrator(make(), tolerance, refinement, float(times[0]))
     recorder = _Recorder(integrator, len(times))
     recorder.record(0)
     integrator.advance(float(times[0]), float(times[0]))  # compiles, or loads what is compiled: not part of the cost

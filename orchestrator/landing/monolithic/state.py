@@ -18,12 +18,15 @@ N_ROBOT = 10
 TURN, SPIN = 3, 6
 """Places in them."""
 ARC, BRISTLE, WALL_LOSS, FRICTION_LOSS, GONE, REGIME, STORED = 0, 1, 3, 4, 5, 6, 9
-N_CONTACT = 10
+NORMAL_MAX, DEEPEST_MAX, SLIP_MAX, IMPULSE, TOUCH_TIME, TIME, LOOKS, RADIAL = 10, 11, 12, 13, 14, 15, 16, 24
+N_LOOK, N_CONTACT = 4, 27
 """Memory of a contact: arc length, bristle (2), energy dissipated by walls and by friction, left the groove, regime
-at the last step's end and at its stages (2), elastic energy of the walls at its end."""
+at the last step's end and at its stages (2), elastic energy of the walls at its end; since the last output time the
+largest normal force, penetration and slip, and the impulse; the time of first touch, the time reached; the last two
+looks at the contact (time, normal force, penetration, slip each); the wheel's radial direction towards the cable (3)."""
 EXCESS = at.SCRATCH
 """Place in the law's results, free there: the bristle's force beyond the Coulomb limit, N."""
-OK, NOT_CONVERGED, CONTACT_FAILED, OFF_CABLE = 0, 1, 2, 3
+OK, NOT_CONVERGED, CONTACT_FAILED, OFF_CABLE, AXLE_ALONG = range(5)
 """Status of the kernels."""
 
 
@@ -33,7 +36,7 @@ class System(NamedTuple):
     Attributes
     ----------
     robot : (56,) of `fmus.robot.rigid_body`
-    contacts : (n_wheels, 14) of `fmus.contact.law`
+    contacts : (n_wheels, 15) of `fmus.contact.law`
     control : (4 + 7 n_wheels,) thrust, torque and drive torques in the places of `rigid_body.resultants`
     """
 
@@ -45,7 +48,7 @@ class System(NamedTuple):
 
 
 class State(NamedTuple):
-    """What changes: cable (its module's flat state), robot (21,), accelerations (2, 10), contacts (n_wheels, 10)."""
+    """What changes: cable (its module's flat state), robot (21,), accelerations (2, 10), contacts (n_wheels, 27)."""
 
     cable: np.ndarray
     robot: np.ndarray
@@ -65,7 +68,7 @@ class Space(NamedTuple):
     trial: np.ndarray  # (n_wheels, 2) trial elongations
     cable_point: np.ndarray  # (n_wheels, 12) p, t, dp, dt
     motion: np.ndarray  # (24,)
-    out: np.ndarray  # (2, n_wheels, 32) results of the law
+    out: np.ndarray  # (2, n_wheels, 34) results of the law
     generalized: np.ndarray  # (m,) generalised forces on (p, t) of each wheel, accelerations of the robot
     reference: np.ndarray  # (m,)
     dy: np.ndarray  # (m, m) derivatives by coordinates

@@ -29,7 +29,7 @@ from fmus.kernels.time_integration import (
 )
 from fmus.robot import rigid_body as rb
 from orchestrator.landing.monolithic import contacts, matrix, robot
-from orchestrator.landing.monolithic.state import ARC, BRISTLE, CONTACT_FAILED, N_ROBOT, NOT_CONVERGED, OK, copy
+from orchestrator.landing.monolithic.state import ARC, BRISTLE, N_ROBOT, NOT_CONVERGED, OK, copy
 
 MAX_ITERATIONS = 15
 SLOW = 0.2
@@ -48,7 +48,7 @@ def step(system, state, h, tolerance, fresh, space, work, allowed, event):
 
     Returns
     -------
-    status : OK, NOT_CONVERGED or CONTACT_FAILED
+    status : OK, NOT_CONVERGED, CONTACT_FAILED or AXLE_ALONG
     error : local error estimate, m: h² times the difference of the robot's accelerations from those predicted
     iterations : of Newton's method
     """
@@ -134,8 +134,9 @@ def _residuals(system, state, h, space, work):
         stage(method, j, h, q0, v0, work.a[0], work.a[1], work.q[j], work.v[j])
         contacts.follow(system, work.q[j], space.stage[j], space.arc[j], space, work.shape)
         contacts.cable_points(system, work.q[j], work.v[j], space.arc[j], points, work.shape)
-        if contacts.walls(system, space.stage[j], points, space.out[j], space) != OK:
-            return CONTACT_FAILED
+        status = contacts.walls(system, space.stage[j], points, state.contacts, space.out[j], space)
+        if status != OK:
+            return status
         for k in range(n_wheels):
             for i in range(2):
                 space.slip[j, k, i] = space.out[j, k, at.SLIP_VELOCITY + i]
