@@ -32,7 +32,7 @@ INTEGRATORS = ("collocation", "generalized_alpha")
 def residuals(model, q, v, work, number):
     """Evaluate the residual of one stage a number of times."""
     for _ in range(number):
-        residual(model, q, v, work.a[0], work.external, work.residual[0], work.axial, work.element)
+        residual(model, q, v, work.a[0], work.external, work.residual[0], work.element)
         constrain_vector(model, work.residual[0])
 
 

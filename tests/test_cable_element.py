@@ -154,7 +154,7 @@ def test_patch_of_uniform_stretch(stretch):
     direction = np.array([0.6, 0.0, 0.8])
     nodes = np.array([0.0, 0.3, 0.4, 1.1])
     q = np.concatenate([np.concatenate([stretch * s * direction, stretch * direction]) for s in nodes])
-    force, out = np.zeros(q.size), np.zeros(3)
+    force, out = np.zeros(q.size), np.zeros(2)
     for e in range(3):
         element.internal_force(q, np.zeros(q.size), 6 * e, nodes[e + 1] - nodes[e], EA, EI, DAMPING, force, out)
     tension = EA * stretch * 0.5 * (stretch**2 - 1.0)
@@ -162,7 +162,6 @@ def test_patch_of_uniform_stretch(stretch):
     expected[0:3], expected[-6:-3] = -tension * direction, tension * direction
     assert np.abs(force - expected).max() < 1e-12 * EA
     assert out[0] == pytest.approx(1.1 * EA / 8.0 * (stretch**2 - 1.0) ** 2, rel=1e-12)
-    assert out[2] == pytest.approx(EA * 0.5 * (stretch**2 - 1.0), rel=1e-12)
 
 
 def test_energy_of_a_parabola():

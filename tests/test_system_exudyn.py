@@ -26,7 +26,7 @@ def ours(mass, times):
         span=LENGTH, level_difference=0.0, unstretched_length=LENGTH, n_elements=N_ELEMENTS, grading=1.0,
         grading_position=-1.0, ea=EA, ei=EI, damping=DAMPING, density=DENSITY, gravity=GRAVITY, clamped=False,
     )  # fmt: skip
-    n, work, axial = model.weight.size, element_work(), np.zeros(N_ELEMENTS)
+    n, work = model.weight.size, element_work()
     middle = 6 * (N_ELEMENTS // 2)
     matrix = np.zeros((n, n))
     for i in range(n):
@@ -43,7 +43,7 @@ def ours(mass, times):
 
     def rates(t, y):
         force = np.zeros(n)
-        internal_force(model, y[:n], y[n:], force, axial, work)
+        internal_force(model, y[:n], y[n:], force, work)
         load = weight - force
         constrain_vector(model, load)
         return np.concatenate([y[n:], inverse @ load])

@@ -28,7 +28,7 @@ class Independent:
     def __init__(self, problem):
         cable, robot, contact = problem.cable, problem.robot, problem.contacts[0]
         self.model, self.n = cable.model, cable.model.weight.size
-        self.work, self.axial = element_work(), np.zeros(self.model.s.size - 1)
+        self.work = element_work()
         self.robot = body_parameters(robot.values, robot.table)
         self.contact = law_parameters(contact.values, contact.table)
         self.s = float(contact.values[contact.table.index["initial.s"]])
@@ -74,7 +74,7 @@ class Independent:
         force, moment = out[at.CABLE_FORCE : at.CABLE_MOMENT], out[at.CABLE_MOMENT : at.WHEEL_FORCE]
         add_load(self.model, q, s, force, moment, np.zeros(8), external)
         force = np.zeros(n)
-        internal_force(self.model, q, v, force, self.axial, self.work)
+        internal_force(self.model, q, v, force, self.work)
         load = self.model.weight + external - force
         constrain_vector(self.model, load)
         loads = np.zeros(rb.BODY_LOADS + rb.WHEEL_LOADS)

@@ -47,12 +47,12 @@ class ElementWork(NamedTuple):
 
 def element_work() -> ElementWork:
     """Return a new workspace."""
-    return ElementWork(np.zeros((12, 12)), np.zeros((12, 12)), np.zeros((4, 4)), np.zeros((7, 4)), np.zeros(3))
+    return ElementWork(np.zeros((12, 12)), np.zeros((12, 12)), np.zeros((4, 4)), np.zeros((7, 4)), np.zeros(2))
 
 
 @kernel
-def internal_force(model, q, v, force, axial, work):
-    """Write the internal force Q_e + Q_d to `force` (n,) and the mean axial force of each element to `axial`.
+def internal_force(model, q, v, force, work):
+    """Write the internal force Q_e + Q_d to `force` (n,).
 
     Returns elastic energy (J) and dissipated power (W).
     """
@@ -61,7 +61,6 @@ def internal_force(model, q, v, force, axial, work):
     for e in range(model.s.size - 1):
         l = model.s[e + 1] - model.s[e]
         element.internal_force(q, v, 6 * e, l, model.ea, model.ei, model.damping, force, work.out)
-        axial[e] = work.out[2]
     return work.out[0], work.out[1]
 
 
@@ -78,9 +77,9 @@ def add_inertia(model, a, force, work):
 
 
 @kernel
-def residual(model, q, v, a, external, force, axial, work):
+def residual(model, q, v, a, external, force, work):
     """Write M a + Q(q, v) - weight - external to `force` (n,), supports not applied; return dissipated power."""
-    power = internal_force(model, q, v, force, axial, work)[1]
+    power = internal_force(model, q, v, force, work)[1]
     add_inertia(model, a, force, work)
     for i in range(force.size):
         force[i] -= model.weight[i] + external[i]

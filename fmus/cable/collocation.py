@@ -99,7 +99,7 @@ def step(model, method, state, h, offset, ports, tolerance, ahead, work):
             q, v, force = work.q[j], work.v[j], work.residual[j]
             stage(method, j, h, q0, v0, work.a[0], work.a[1], q, v)
             port_loads(model, q, ports, offset + method.c[j] * h, work)
-            work.power[j] = residual(model, q, v, work.a[j], work.external, force, work.axial, work.element)
+            work.power[j] = residual(model, q, v, work.a[j], work.external, force, work.element)
             constrain_vector(model, force)
         to_mode(method, work.residual, work.mode)
         banded.solve(work.late_band if work.late[0] else work.band, work.mode)

@@ -65,7 +65,7 @@ def internal_force(q, v, o, l, ea, ei, c, force, out):
     q, v : (n,) coordinates and velocities of the whole cable; the element's are o … o + 12
     l, ea, ei, c : element length m, axial stiffness N, bending stiffness N m², damping time s
     force : (n,), Q_e + Q_d is added (eqs. 22, 24)
-    out : (3,) elastic energy J, dissipated power W and mean axial force N; the first two are added to
+    out : (2,) elastic energy J and dissipated power W, added to
     """
     # d, r_x1, r_x2 and their rates
     d0, d1, d2 = (q[o + 6] - q[o]) / l, (q[o + 7] - q[o + 1]) / l, (q[o + 8] - q[o + 2]) / l
@@ -75,7 +75,7 @@ def internal_force(q, v, o, l, ea, ei, c, force, out):
     ad0, ad1, ad2 = v[o + 3], v[o + 4], v[o + 5]
     bd0, bd1, bd2 = v[o + 9], v[o + 10], v[o + 11]
     fd0 = fd1 = fd2 = fa0 = fa1 = fa2 = fb0 = fb1 = fb2 = 0.0
-    energy = power = axial = 0.0
+    energy = power = 0.0
     for i in range(N_GAUSS):
         s0, s1, s2 = SLOPE[i, 0], SLOPE[i, 1], SLOPE[i, 2]
         z0, z1, z2 = BEND[i, 0] / l, BEND[i, 1] / l, BEND[i, 2] / l
@@ -101,7 +101,6 @@ def internal_force(q, v, o, l, ea, ei, c, force, out):
         energy += 0.5 * w * (ea * eps * eps + ei * (k0 * k0 + k1 * k1 + k2 * k2))
         power += w * c * (ea * eps_rate * eps_rate + ei * (kd0 * kd0 + kd1 * kd1 + kd2 * kd2))
         n = ea * (eps + c * eps_rate)
-        axial += WEIGHTS[i] * n
         m0, m1, m2 = ei * (k0 + c * kd0), ei * (k1 + c * kd1), ei * (k2 + c * kd2)
         # P_g = n g + h × m, P_h = m × g
         pg0, pg1, pg2 = (
@@ -133,7 +132,6 @@ def internal_force(q, v, o, l, ea, ei, c, force, out):
     force[o + 11] += fb2
     out[0] += energy
     out[1] += power
-    out[2] = axial
 
 
 @kernel

@@ -62,7 +62,7 @@ def step(model, method, state, h, offset, ports, tolerance, fresh, work):
     while True:
         _midpoint(method, h, q0, v0, a[0], work)
         port_loads(model, q, ports, at, work)
-        power = residual(model, q, v, work.a[1], work.external, work.residual[0], work.axial, work.element)
+        power = residual(model, q, v, work.a[1], work.external, work.residual[0], work.element)
         constrain_vector(model, work.residual[0])
         change, left = _correct(cq, work), left - 1
         verdict = judge(change, previous, left, tolerance, SLOW)

@@ -81,9 +81,9 @@ _PARAMETERS = [
 
 
 _OUTPUTS = (
-    ("tension_left", "N", "tension at the left support"),
-    ("tension_mid", "N", "tension at midspan"),
-    ("tension_right", "N", "tension at the right support"),
+    ("tension_left", "N", "magnitude of the force of the left support"),
+    ("tension_mid", "N", "tension in the middle of the cable: force of the cross-section along the tangent"),
+    ("tension_right", "N", "magnitude of the force of the right support"),
     ("kinetic_energy", "J", "kinetic energy"),
     ("strain_energy", "J", "elastic energy of stretching and bending"),
     ("gravitational_energy", "J", "potential energy of gravity, zero at z = 0"),
@@ -131,7 +131,7 @@ def _table() -> VariableTable:
     rows += [Variable(name, "output", unit, 0.0, description) for name, unit, description in _OUTPUTS]
     for i in range(N_SHAPE):
         rows += vector(f"shape[{i + 1}].position", "output", "m", f"centreline at {i}/{N_SHAPE - 1} of its length")
-        rows.append(Variable(f"shape[{i + 1}].tension", "output", "N", 0.0, "axial force there"))
+        rows.append(Variable(f"shape[{i + 1}].tension", "output", "N", 0.0, "tension there: force of the cross-section along the tangent"))
     return VariableTable(rows)
 
 

@@ -26,7 +26,7 @@ class Work(NamedTuple):
 
     element: ElementWork
     shape: np.ndarray
-    axial: np.ndarray
+    section: np.ndarray
     q: np.ndarray
     v: np.ndarray
     a: np.ndarray
@@ -57,7 +57,7 @@ def make_work(n: int, state_size: int) -> Work:
     return Work(
         element=element_work(),
         shape=np.zeros(8),
-        axial=np.zeros(n // 6 - 1),
+        section=np.zeros((n // 6 + 1, 3)),
         q=np.zeros((2, n)),
         v=np.zeros((2, n)),
         a=np.zeros((2, n)),

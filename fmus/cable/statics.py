@@ -186,13 +186,13 @@ class _Potential:
     def __init__(self, model: Model, q0: np.ndarray, external: np.ndarray):
         n = q0.size
         self.model, self.q0, self.external = model, q0.copy(), external
-        self.zero, self.force, self.axial = np.zeros(n), np.zeros(n), np.zeros(model.s.size - 1)
+        self.zero, self.force = np.zeros(n), np.zeros(n)
         self.band, self.matrix = np.zeros((n, 2 * HALF_BANDWIDTH + 1)), np.zeros((13, 12))
         self.work = element_work()
 
     def evaluate(self, q: np.ndarray) -> tuple[float, np.ndarray]:
         """Return energy (J) and residual (n,)."""
-        energy = internal_force(self.model, q, self.zero, self.force, self.axial, self.work)[0]
+        energy = internal_force(self.model, q, self.zero, self.force, self.work)[0]
         residual = self.force - self.external
         constrain_vector(self.model, residual)
         return energy - dot(self.external, q - self.q0), residual

@@ -91,6 +91,6 @@ def support_forces(model: Model, q: np.ndarray) -> np.ndarray:
     from fmus.cable.assembly import element_work, internal_force
 
     force = np.zeros(q.size)
-    internal_force(model, q, np.zeros(q.size), force, np.zeros(model.s.size - 1), element_work())
+    internal_force(model, q, np.zeros(q.size), force, element_work())
     force -= model.weight
     return np.stack([force[:3], force[-6:-3]])

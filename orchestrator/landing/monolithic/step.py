@@ -150,7 +150,7 @@ def _residuals(system, state, h, space, work):
         contacts.loads(system, space.stage[j], points, space.trial, state.contacts, out, forces, space)
         _external(model, space.arc[j], forces, work)
         force = work.residual[j]
-        work.power[j] = residual(model, work.q[j], work.v[j], work.a[j], work.external, force, work.axial, work.element)
+        work.power[j] = residual(model, work.q[j], work.v[j], work.a[j], work.external, force, work.element)
         constrain_vector(model, force)
         for i in range(N_ROBOT):
             space.c[j, i] = space.b[j, i] - forces[6 * n_wheels + i]
