@@ -340,7 +340,9 @@ def move_cable(contact):
 
 @pytest.mark.parametrize("name", ["point", "waveform", "hermite"])
 def test_sticks_without_creep_then_slides_at_the_limit(name):
-    contact = seated(4e-3, exchange=name, damping=0.0, tangential_damping=0.0, max_contact_length=1e-3, reference_length=1e-3)
+    contact = seated(
+        4e-3, exchange=name, damping=0.0, tangential_damping=0.0, max_contact_length=1e-3, reference_length=1e-3
+    )
     limit = 0.7 * read(contact, "normal_force")
     reach = limit / 1e6
     slide(contact, 0.5 * reach, 10)

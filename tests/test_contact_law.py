@@ -11,38 +11,10 @@ from scipy.optimize import brentq
 from scipy.spatial.transform import Rotation
 
 from fmus.contact import places as at
-from fmus.contact.law import LEFT, NODES, OK, OPEN, SLIP, STEEP, STICK, contact_wrench, law_parameters
-from fmus.contact.module import Contact
+from fmus.contact.law import LEFT, NODES, OK, OPEN, SLIP, STEEP, STICK, contact_wrench
+from tests.contacts import APEX, COS, HALF, SEAT, SIN, parameters, wheel_above, wrench
 
 pytestmark = pytest.mark.portable
-
-HALF = math.radians(50.0)
-SIN, COS = math.sin(HALF), math.cos(HALF)
-APEX = 0.075 - 0.04 / math.tan(HALF)
-SEAT = APEX + 0.009 / SIN  # radial distance at which the cable just touches both walls
-
-
-def parameters(**settings):
-    values = Contact.table.defaults()
-    Contact.table.assign(values, settings)
-    return law_parameters(values, Contact.table)
-
-
-def wheel_above(depth=0.0, lateral=0.0, velocity=(0.0, 0.0, 0.0), slip_rate=(0.0, 0.0)):
-    """A level cable along +Y under a wheel whose centre is `depth` (m) below first touch of the groove."""
-    motion = np.zeros(at.MOTION_SIZE)
-    motion[at.TANGENT + 1] = 1.0
-    motion[at.CENTRE : at.AXLE] = -lateral, 0.0, SEAT - depth
-    motion[at.AXLE] = 1.0
-    motion[at.CENTRE_RATE : at.TURN_RATE] = velocity
-    motion[at.POINT_RATE + 1], motion[at.POINT_RATE] = slip_rate
-    return motion
-
-
-def wrench(motion, slip=(0.0, 0.0), **settings):
-    out = np.zeros(at.OUT_SIZE)
-    assert contact_wrench(parameters(**settings), motion, np.array(slip, float), out) == 0
-    return out
 
 
 def random_motion(rng, depth=None):
@@ -174,7 +146,9 @@ def test_a_cable_steeper_than_the_wall_is_refused():
 def test_lateral_self_centring():
     """Small lateral offset y of a point contact: F_y = -2 n k delta^(n-1) cos^2(theta/2) y on the cable."""
     delta, y = 4e-3, 1e-7
-    out = wrench(wheel_above(delta / SIN, lateral=y), max_contact_length=1e-7, reference_length=1e-7, friction_coefficient=0.0)
+    out = wrench(
+        wheel_above(delta / SIN, lateral=y), max_contact_length=1e-7, reference_length=1e-7, friction_coefficient=0.0
+    )
     assert out[at.CABLE_FORCE] == pytest.approx(-2.0 * 2.5 * 1e8 * delta**1.5 * COS**2 * y, rel=1e-6)
 
 
@@ -308,7 +282,8 @@ def test_restitution_of_hunt_crossley():
 
     For a point contact in the groove the walls' rate is sin(theta/2) of the radial speed: E = D sin(theta/2).
     """
-    prm, out, none = parameters(max_contact_length=1e-7, reference_length=1e-7, friction_coefficient=0.0), np.zeros(at.OUT_SIZE), np.zeros(2)
+    prm = parameters(max_contact_length=1e-7, reference_length=1e-7, friction_coefficient=0.0)
+    out, none = np.zeros(at.OUT_SIZE), np.zeros(2)
 
     def fall(t, x):
         contact_wrench(prm, wheel_above(x[0], velocity=(0.0, 0.0, -x[1])), none, out)

@@ -98,7 +98,7 @@ def test_the_overview_shows_all_wheels_and_angles(tmp_path: Path, n_wheels: int)
     figure = plots.overview(tmp_path / "a.png", table, None, panels_for(table), flight(table))
     assert [len(lines(figure, k)) for k in range(4)] == [1, 3, n_wheels, 1]
     assert [axis.get_ylabel() for axis in figure.axes] == [
-        "Z displacement [m]", "Angle [°]", "Contact force [N]", "Cable tension [kN]",
+        "Z displacement [m]", "Angle [°]", "Sum of wall forces [N]", "Cable tension [kN]",
     ]  # fmt: skip
     assert lines(figure)[0] == pytest.approx(Z - Z[0], abs=1e-15)
     assert lines(figure, 2)[-1].max() == 400.0 + n_wheels

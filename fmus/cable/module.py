@@ -131,7 +131,15 @@ def _table() -> VariableTable:
     rows += [Variable(name, "output", unit, 0.0, description) for name, unit, description in _OUTPUTS]
     for i in range(N_SHAPE):
         rows += vector(f"shape[{i + 1}].position", "output", "m", f"centreline at {i}/{N_SHAPE - 1} of its length")
-        rows.append(Variable(f"shape[{i + 1}].tension", "output", "N", 0.0, "tension there: force of the cross-section along the tangent"))
+        rows.append(
+            Variable(
+                f"shape[{i + 1}].tension",
+                "output",
+                "N",
+                0.0,
+                "tension there: force of the cross-section along the tangent",
+            )
+        )
     return VariableTable(rows)
 
 

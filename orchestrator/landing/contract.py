@@ -42,6 +42,7 @@ def _scalar(name: str, causality: Causality, unit: str, needed: bool = True, use
     return Point(name, causality, unit, needed, False, use)
 
 
+INSIDE = "for what happens within a macro step"
 ENERGY_CONJUGATE = f"for {PARAMETER} = {suited_to(implicit=True)}"
 
 ROBOT = (
@@ -126,6 +127,13 @@ CONTACT = (
     _scalar("contact_length", "output", "m"),
     _scalar("status", "output", "1"),
     _scalar("dissipated_energy", "output", "J", False, "for the energy audit"),
+    _scalar("radial_force", "output", "N", False, "what a force sensor in the wheel measures"),
+    _scalar("lateral_force", "output", "N", False, "what a force sensor in the wheel measures"),
+    _scalar("normal_force_max", "output", "N", False, INSIDE),
+    _scalar("penetration_max", "output", "m", False, INSIDE),
+    _scalar("slip_velocity_max", "output", "m/s", False, INSIDE),
+    _scalar("impulse", "output", "N.s", False, INSIDE),
+    _scalar("touch_time", "output", "s", False, INSIDE),
 )
 CONTRACTS = {"robot": ROBOT, "cable": CABLE, "contact": CONTACT}
 MOST_PORTS = 4

@@ -77,6 +77,8 @@ def _signals(axis: Axes, panel: Panel, run: Table, reference: Table | None) -> N
         if reference is not None and signal in reference:
             axis.plot(reference["time"], panel.values(signal, reference), color=colour, alpha=0.3, linewidth=2.8)
         dashes = LINES[1] if reference is not None else LINES[i // 2 % len(LINES)]  # lines may lie on each other
+        if (peak := panel.peak(signal, run)) is not None:  # of every macro step, over its length
+            axis.plot(run["time"], peak, color=colour, linewidth=0.6, alpha=0.7, drawstyle="steps-pre")
         axis.plot(run["time"], panel.values(signal, run), color=colour, linewidth=1.0, linestyle=dashes, label=words)
     axis.set_ylabel(panel.axis)
     axis.set_xlim(run["time"][0], run["time"][-1])

@@ -25,6 +25,8 @@ MOST_PANELS, MOST_LINES = 6, 6
 """Panels of a general graph, and lines in one panel."""
 BETWEEN = re.compile(r"_(mean|rate)((?:\.[xyz])?)$")
 """End of the name of a mean or slope that belongs to another signal, and only serves the coupling."""
+PEAK = "_max"
+"""End of the name of a signal's largest value within the last macro step."""
 NO_UNITS: Mapping[str, str] = MappingProxyType({})
 
 
@@ -47,6 +49,7 @@ class Panel:
     factor : from the signals' own unit to `unit`
     own_unit : of the signals
     from_start : whether their change since the start is drawn
+    peaks : whether there is a signal ``…_max`` of each, its largest value within every macro step
     """
 
     label: str
@@ -55,6 +58,7 @@ class Panel:
     factor: float = 1.0
     own_unit: str = ""
     from_start: bool = False
+    peaks: bool = False
 
     @property
     def axis(self) -> str:
@@ -69,7 +73,13 @@ class Panel:
     def among(self, table: Table) -> Panel:
         """Return the panel with those lines alone that `table` has as well."""
         lines = {signal: words for signal, words in self.lines.items() if signal in table}
-        return Panel(self.label, self.unit, lines, self.factor, self.own_unit, self.from_start)
+        return Panel(self.label, self.unit, lines, self.factor, self.own_unit, self.from_start, self.peaks)
+
+    def peak(self, signal: str, table: Table) -> np.ndarray | None:
+        """Return the largest values of a signal within the macro steps, in `unit`; None where `table` has none."""
+        if not self.peaks or f"{signal}{PEAK}" not in table:
+            return None
+        return shown(table[f"{signal}{PEAK}"], self.own_unit) * self.factor
 
 
 @dataclass(frozen=True)
@@ -83,12 +93,13 @@ class _Kind:
     own_unit: str
     words: str = "{}"
     from_start: bool = False
+    peaks: bool = False
 
 
 LANDING = (
     _Kind("Z displacement", r"robot\.body\.position\.()z", "m", 1.0, "m", from_start=True),
     _Kind("Angle", r"robot\.(roll|pitch|yaw)", "°", DEGREES, "rad"),
-    _Kind("Contact force", r"contact(\d+)\.normal_force", "N", 1.0, "N", "wheel {}"),
+    _Kind("Sum of wall forces", r"contact(\d+)\.normal_force", "N", 1.0, "N", "wheel {}", peaks=True),
     _Kind("Cable tension", r"cable\.tension_()mid", "kN", 1e-3, "N"),
 )
 
@@ -110,7 +121,7 @@ def panels_for(
 def _of_kind(kind: _Kind, table: Table) -> Panel:
     found = {n: kind.words.format(m[1]) if m[1] else "" for n in table if (m := re.fullmatch(kind.pattern, n))}
     lines = found if len(found) > 1 else dict.fromkeys(found, "")
-    return Panel(kind.label, kind.unit, lines, kind.factor, kind.own_unit, kind.from_start)
+    return Panel(kind.label, kind.unit, lines, kind.factor, kind.own_unit, kind.from_start, kind.peaks)
 
 
 def _of_graph(names: Iterable[str], units: Mapping[str, str]) -> list[Panel]:
@@ -146,11 +157,15 @@ def words(signal: str) -> str:
 def extremes(
     table: Table, chosen: Iterable[str] = (), units: Mapping[str, str] = NO_UNITS
 ) -> Iterator[tuple[str, ...]]:
-    """Yield a row for each signal of the panels: name, unit, start, least, largest and end, noise as 0."""
+    """Yield a row for each signal of the panels: name, unit, start, least, largest and end, noise as 0.
+
+    The largest is that within the macro steps, where the table has it.
+    """
     for panel in panels_for(table, chosen, units):
         for signal in panel.lines:
             values = shown(table[signal], panel.own_unit) * panel.factor
-            numbers = (values[0], values.min(), values.max(), values[-1])
+            peak = panel.peak(signal, table)
+            numbers = (values[0], values.min(), (values if peak is None else peak).max(), values[-1])
             unit = {"°": "deg", "–": "1"}.get(panel.unit, panel.unit)
             yield signal, unit, *(f"{number + 0.0:.5g}" for number in numbers)  # + 0.0: no -0
 

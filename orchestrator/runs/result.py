@@ -158,10 +158,12 @@ class Run:
 
     @property
     def warnings(self) -> list[str]:
-        """What went wrong, a line each: unconverged steps, a fall, energy that drifts, the end before its time."""
+        """What went wrong, a line each: unconverged steps, a fall, impacts that the steps do not resolve, energy that drifts,
+        the end before its time."""
         drift = self.energy.warning() if self.energy is not None else None
         lines = [self._unconverged()] if self.summary["unconverged_steps"] else []
         lines += [f"{contact}: the cable left the groove; the robot has fallen off" for contact in self.fallen]
+        lines += [_unresolved(impact) for impact in self.summary.get("unresolved_impacts", [])]
         lines += [drift] if drift is not None else []
         lines += [f"{self.error}; the results up to there are kept"] if self.error else []
         return lines + ([f"no pictures: {self.manifest['pictures']}"] if self.manifest.get("pictures") else [])
@@ -185,6 +187,16 @@ class Run:
         place = f"; {self.directory}" if self.directory is not None else ""
         name, steps = self.summary["scenario"], self.summary["steps"]
         return f"Run({name}: {self.master}, {steps} steps of {self.macro_step:g} s, {self.verdict}{place})"
+
+
+def _unresolved(impact: Mapping[str, Any]) -> str:
+    """Say what a step too long for an impact means, and what helps."""
+    rise, step = 0.25 * impact["period"], impact["step"]
+    return (
+        f"{impact['contact']} meets the cable with {impact['speed']:.2g} m/s after t = {impact['time']:g} s, and the force of "
+        f"such an impact rises within {rise:.2g} s, a quarter of the contact's period: the step of {step:.2g} s does not "
+        f"resolve it, the peak of its force is not known; take a macro step of at most {rise:.1g} s"
+    )
 
 
 def run_label(master: str, macro_step: float) -> str:

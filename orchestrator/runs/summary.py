@@ -3,12 +3,13 @@
 from __future__ import annotations
 
 from collections.abc import Mapping
+from dataclasses import asdict
 from typing import Any
 
 import numpy as np
 
 from orchestrator.coupling.run.interrupt import Interruption
-from orchestrator.coupling.run.results import plain
+from orchestrator.coupling.run.results import Table, plain
 from orchestrator.landing.fields import interface_balance
 from orchestrator.runs.coupled import Coupled
 from orchestrator.runs.result import Run, Verdict
@@ -48,6 +49,7 @@ def summary(coupled: Coupled) -> dict[str, Any]:
         "macro_step": log.macro_step,
         **_cost(coupled),
         "left_the_groove": coupled.fallen,
+        "unresolved_impacts": unresolved(coupled),
         "energy": coupled.energy.content() if coupled.energy is not None else about["energy"],
         "interface_work_J": {name: float(work[-1]) for name, work in log.energy.items()},
         "energy_residual_J": {name: float(np.max(np.abs(r))) for name, r in log.energy_residual.items()},
@@ -57,7 +59,7 @@ def summary(coupled: Coupled) -> dict[str, Any]:
         "estimate_failure": coupled.estimate_failure,
         "interface_balance": interface_balance(coupled.table, log.energy),
         "units": {"time": "s"} | {name: log.units[name] for name in coupled.table if name in log.units},
-        "extremes": {n: _extremes(log.time, values) for n, values in coupled.table.items() if n != "time"},
+        "extremes": {n: _extremes(log.time, coupled.table, n) for n in coupled.table if n != "time"},
     }
 
 
@@ -83,13 +85,32 @@ def _cost(coupled: Coupled) -> dict[str, Any]:
     }
 
 
-def _extremes(time: np.ndarray, values: np.ndarray) -> dict[str, float]:
-    low, high = int(np.argmin(values)), int(np.argmax(values))
+def unresolved(coupled: Coupled) -> list[dict[str, Any]]:
+    """Return the impacts whose force rises, in a quarter of the contact's period, within less than a step; one a contact,
+    the shortest.
+
+    A macro step that was divided counts as the mean of its parts.
+    """
+    log, found = coupled.log, dict[str, dict[str, Any]]()
+    steps = log.macro_step / np.array([1.0 + step.subdivisions for step in log.steps])
+    for impact in sorted(coupled.system.impacts(coupled.table), key=lambda impact: impact.period):
+        rise = 0.25 * impact.period
+        during = (log.time[1:] > impact.time) & (log.time[:-1] < impact.time + log.macro_step + rise)
+        longest = float(np.max(steps[during], initial=0.0))
+        if longest > rise:
+            found.setdefault(impact.contact, {**asdict(impact), "step": longest})
+    return list(found.values())
+
+
+def _extremes(time: np.ndarray, table: Table, name: str) -> dict[str, float]:
+    """Return start, end, least and largest value; the largest within the macro steps where the table has it."""
+    values, tops = table[name], table.get(f"{name}_max", table[name])
+    low, high = int(np.argmin(values)), int(np.argmax(tops))
     pairs = {
         "start": values[0],
         "end": values[-1],
         "min": values[low],
         "min_time": time[low],
-        "max": values[high],
+        "max": tops[high],
     }
     return {name: float(value) for name, value in {**pairs, "max_time": time[high]}.items()}

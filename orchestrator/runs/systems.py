@@ -21,6 +21,7 @@ from orchestrator.coupling.run.results import Table
 from orchestrator.landing import audit
 from orchestrator.landing.build import has_monolithic, problem
 from orchestrator.landing.fields import cable_fields
+from orchestrator.landing.impacts import Impact, impacts
 from orchestrator.landing.resolve import Landing, Variables
 from orchestrator.landing.resolve import resolve as resolve_landing
 from orchestrator.landing.wiring import landing_graph
@@ -61,6 +62,10 @@ class System(Protocol):
 
     def about(self, table: Table) -> dict[str, Any]:
         """Return what ``summary.json`` says of this kind of system alone."""
+        ...
+
+    def impacts(self, table: Table) -> list[Impact]:
+        """Return the impacts of wheels on a cable, and how long each lasts."""
         ...
 
     def changed(self, options: Mapping[str, Any], **simulation: Any) -> System:
@@ -106,6 +111,10 @@ class LandingSystem:
         robot = self.scenario.robot
         energy = {"verdict": None, "missing": audit.missing(table)}
         return {"stiffness_set": self.scenario.cable.stiffness_set, "robot": robot.model or robot.fmu, "energy": energy}
+
+    def impacts(self, table: Table) -> list[Impact]:
+        """Return the impacts of the wheels, and how long each lasts."""
+        return impacts(self.landing, table)
 
     def changed(self, options: Mapping[str, Any], **simulation: Any) -> LandingSystem:
         """Return it with other options of the master and other simulation settings; the start stays as it is."""
@@ -161,6 +170,10 @@ class GraphSystem:
     def about(self, table: Table) -> dict[str, Any]:
         """Return nothing that only a landing has."""
         return {"stiffness_set": None, "robot": None, "energy": {}}
+
+    def impacts(self, table: Table) -> list[Impact]:
+        """Return nothing: a general graph has no wheels."""
+        return []
 
     def changed(self, options: Mapping[str, Any], **simulation: Any) -> GraphSystem:
         """Return it with other options of the master and other simulation settings."""

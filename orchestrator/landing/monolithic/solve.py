@@ -95,9 +95,7 @@ class Integrator:
     start_time : s
     """
 
-    def __init__(
-        self, problem: Problem, tolerance: float = TOLERANCE, refinement: int = 1, start_time: float = 0.0
-    ):
+    def __init__(self, problem: Problem, tolerance: float = TOLERANCE, refinement: int = 1, start_time: float = 0.0):
         self.problem = problem
         cable, robot = problem.cable, problem.robot
         self.method = collocation(cable["spectral_radius"])
