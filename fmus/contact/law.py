@@ -107,13 +107,16 @@ def lateral(u, a):
 
 @kernel
 def _reach(u_a, y, prm):
-    """Return the ends, from the foot, of the piece of line that a wall can touch: inside the groove's rims.
+    """Return the ends, from the foot, of the piece of line on which contact is looked for.
 
-    `max_contact_length` is an upper limit to it.
+    A point in the groove is nearer to the axle than the rim, so that half the piece is at most (R + d_c/2)/cos(θ/2) long
+    while the cable is less steep than the walls. This does not move with the motion: a piece cut at the rims would
+    lose energy with what is cut. A steeper line is looked at between the rims.
     """
-    half, rim = 0.5 * prm[at.MAX_LENGTH], 0.5 * prm[at.GROOVE_WIDTH]
-    steep = abs(u_a)
-    if steep * half + abs(y) <= rim:
+    half = (prm[at.WHEEL_RADIUS] + 0.5 * prm[at.CABLE_DIAMETER]) / prm[at.COSINE]
+    half = min(half, 0.5 * prm[at.MAX_LENGTH])
+    rim, steep = 0.5 * prm[at.GROOVE_WIDTH], abs(u_a)
+    if steep < prm[at.SINE] or abs(y) > rim:
         return -half, half
     drift = y if u_a > 0.0 else -y
     return max(-half, -(rim + drift) / steep), min(half, (rim - drift) / steep)
@@ -213,7 +216,7 @@ def walls(prm, motion, out):
     sum_a = sum_ax = sum_r = sum_rx = sum_rxx = 0.0
     deepest = -math.inf
     first, last = math.inf, -math.inf
-    reach = _reach(u_a, y, prm) if not outside else (0.0, 0.0)
+    reach = _reach(u_a, y, prm)
     for wall in range(2):
         side = 1.0 - 2.0 * wall
         x = _deepest(side, u_a, (centre, closest), reach, prm)

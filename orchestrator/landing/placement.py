@@ -5,7 +5,7 @@ The cable is looked at in the vertical plane through its supports, in which it h
 
 from __future__ import annotations
 
-from collections.abc import Callable
+from collections.abc import Callable, Sequence
 from dataclasses import dataclass
 
 import numpy as np
@@ -19,6 +19,10 @@ from fmus.kernels.roots import root
 from fmus.kernels.rotations import from_euler, rotate
 from fmus.module.variables import ModuleError
 from fmus.robot.module import Robot
+from orchestrator.landing.seat import Wheel, lift_to_touch, require_groove
+
+Foot = tuple[float, float, float]
+"""Arc length, distance (negative under the cable) and y of the cable's point nearest to a wheel centre."""
 
 
 @dataclass(frozen=True)
@@ -55,18 +59,19 @@ def place(
     velocity : sinking speed at the start, m/s
 
     Roll is turned so that all wheels touch where there are several; other angles, and the roll of a robot with one
-    wheel, are its parameters ``initial.*``.
+    wheel, are its parameters ``initial.*``. A robot turned in yaw touches the walls of its grooves higher: no wheel
+    starts pressed into the cable.
 
     Raises
     ------
-    ModuleError : the landing point is off the span
+    ModuleError : the landing point or a wheel is off the span, or the cable does not lie in the groove of a wheel
     """
     span = cable["span"]
     if not 0.0 < position < span:
         raise ModuleError(f"landing.position = {position:g} m is off the span; choose one between 0 and {span:g} m")
     names = [f"initial.{a}" for a in ("roll", "pitch", "yaw")]
     angles = np.array([robot.values[robot.table.index[n]] for n in names])
-    mounts = np.array([_mount(robot, k) for k in range(robot.n_wheels)])
+    mounts = np.array([_vector(robot, k, "mount") for k in range(robot.n_wheels)])
     distance = touching_distance(contact)
 
     def centres(unknown: np.ndarray) -> np.ndarray:
@@ -82,12 +87,16 @@ def place(
         found = np.array([*(above - centres(np.zeros(3))[0, 1:]), 0.0])
     else:
         found = _all_touching(cable, centres, distance, position, above[1] - np.mean(mounts[:, 2]))
-    feet = [_foot(cable, centre) for centre in centres(found)]
     lateral = float(np.mean(centres(found)[:, 0]))
+    touching = centres(found) - [lateral, 0.0, 0.0]
+    feet = [_foot(cable, centre) for centre in touching]
+    _require_span(cable, touching, feet)
+    wheels = _wheels(cable, robot, contact, np.array([angles[0] + found[2], *angles[1:]]), touching, feet)
+    require_groove(wheels)
     initial = {
         "initial.position.x": -lateral,
         "initial.position.y": float(found[0]),
-        "initial.position.z": float(found[1] + height),
+        "initial.position.z": float(found[1] + lift_to_touch(wheels) + height),
         "initial.velocity.z": -velocity,
         "initial.roll": float(angles[0] + found[2]),
     }
@@ -112,8 +121,33 @@ def _all_touching(
     return found
 
 
-def _mount(robot: Robot, k: int) -> np.ndarray:
-    return robot.values[robot.table.indices(f"wheel[{k + 1}].mount.{axis}" for axis in "xyz")]
+def _vector(robot: Robot, k: int, name: str) -> np.ndarray:
+    """Return a parameter (3,) of wheel k, counted from 0."""
+    return robot.values[robot.table.indices(f"wheel[{k + 1}].{name}.{axis}" for axis in "xyz")]
+
+
+def _wheels(
+    cable: Cable, robot: Robot, contact: Contact, angles: np.ndarray, centres: np.ndarray, feet: Sequence[Foot]
+) -> list[Wheel]:
+    """Return the wheels of the robot at `centres` (n, 3), turned by roll, pitch and yaw, each over its foot."""
+    q, wheels = np.zeros(4), []
+    from_euler(angles[0], angles[1], angles[2], q)
+    for k in range(robot.n_wheels):
+        point, axle = _point(cable, feet[k][0]), np.array(rotate(q, *_vector(robot, k, "axle_direction")))
+        wheels.append(Wheel(k + 1, point[:3], point[3:], centres[k], axle, contact))
+    return wheels
+
+
+def _require_span(cable: Cable, centres: np.ndarray, feet: Sequence[Foot]) -> None:
+    """Raise `ModuleError` naming the first wheel that stands beyond a support: its foot is an end of the cable."""
+    span, length = cable["span"], float(cable.model.s[-1])
+    for k, (s, _, _) in enumerate(feet):
+        if not 0.0 < s < length:
+            side = "left" if s <= 0.0 else "right"
+            raise ModuleError(
+                f"landing: wheel[{k + 1}] stands at y = {centres[k, 1]:.4g} m, beyond the {side} support (the span is 0 to "
+                f"{span:g} m): every wheel needs cable under it; move landing.position towards the middle"
+            )
 
 
 def _point(cable: Cable, s: float) -> np.ndarray:
@@ -129,7 +163,7 @@ def arc_length_at(cable: Cable, y: float) -> float:
     return root(lambda s: float(_point(cable, s)[1]) - y, 0.0, length, xtol=1e-12 * length)
 
 
-def _foot(cable: Cable, centre: np.ndarray) -> tuple[float, float, float]:
+def _foot(cable: Cable, centre: np.ndarray) -> Foot:
     """Return arc length, distance (negative under the cable) and y of the cable's point nearest to `centre` (3,).
 
     All in the plane of the cable, y and z.
