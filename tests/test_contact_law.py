@@ -62,7 +62,7 @@ def test_seat_depth_of_a_point_contact():
     """Two walls at half the groove angle from the radial direction: W = 2 k delta^n sin(theta/2)."""
     weight = 38.0 * 9.8
     delta = (weight / (2.0 * 1e8 * SIN)) ** (1 / 2.5)
-    out = wrench(wheel_above(delta / SIN), max_contact_length=1e-7, reference_length=1e-7)
+    out = wrench(wheel_above(delta / SIN), max_contact_length=1e-7, reference_length=2e-7)
     assert out[at.WHEEL_FORCE + 2] == pytest.approx(weight, rel=1e-9)
     assert out[at.CABLE_FORCE + 2] == pytest.approx(-weight, rel=1e-9)
     assert out[at.NORMAL] == pytest.approx(weight / SIN, rel=1e-9)
@@ -101,14 +101,14 @@ def test_contact_length_is_that_of_the_geometry_and_grows():
         lengths.append(wrench(wheel_above(depth))[at.CONTACT_LENGTH])
         assert lengths[-1] == pytest.approx(2.0 * math.sqrt(SEAT**2 - (SEAT - depth) ** 2), rel=1e-9)
     assert lengths == sorted(lengths)
-    assert wrench(wheel_above(0.02), max_contact_length=0.06)[at.CONTACT_LENGTH] == pytest.approx(0.06, rel=1e-12)
+    assert wrench(wheel_above(0.02), max_contact_length=0.03)[at.CONTACT_LENGTH] == pytest.approx(0.06, rel=1e-12)
     assert wrench(wheel_above(-1e-9))[at.CONTACT_LENGTH] == 0.0
 
 
 @settings(max_examples=60, deadline=None)
 @given(seed=st.integers(0, 2**32 - 1))
 def test_longest_contact_length_changes_nothing_beyond_what_touches(seed):
-    """An upper limit of 0.12 m is longer than the chord of the groove, 2 SEAT = 0.106 m; 5 m is no different."""
+    """A limit of 0.12 m from the foot is longer than the chord of the groove, 2 SEAT = 0.106 m; 5 m is no different."""
     motion = random_motion(np.random.default_rng(seed), depth=0.01)
     out = [wrench(motion, max_contact_length=length) for length in (0.12, 5.0)]
     np.testing.assert_array_equal(out[0], out[1])
@@ -147,7 +147,7 @@ def test_lateral_self_centring():
     """Small lateral offset y of a point contact: F_y = -2 n k delta^(n-1) cos^2(theta/2) y on the cable."""
     delta, y = 4e-3, 1e-7
     out = wrench(
-        wheel_above(delta / SIN, lateral=y), max_contact_length=1e-7, reference_length=1e-7, friction_coefficient=0.0
+        wheel_above(delta / SIN, lateral=y), max_contact_length=1e-7, reference_length=2e-7, friction_coefficient=0.0
     )
     assert out[at.CABLE_FORCE] == pytest.approx(-2.0 * 2.5 * 1e8 * delta**1.5 * COS**2 * y, rel=1e-6)
 
@@ -282,7 +282,7 @@ def test_restitution_of_hunt_crossley():
 
     For a point contact in the groove the walls' rate is sin(theta/2) of the radial speed: E = D sin(theta/2).
     """
-    prm = parameters(max_contact_length=1e-7, reference_length=1e-7, friction_coefficient=0.0)
+    prm = parameters(max_contact_length=1e-7, reference_length=2e-7, friction_coefficient=0.0)
     out, none = np.zeros(at.OUT_SIZE), np.zeros(2)
 
     def fall(t, x):
@@ -323,7 +323,7 @@ def test_friction_sticks_up_to_the_coulomb_limit():
 def test_wedge_raises_sliding_friction():
     """Walls carry W = N sin(theta/2), friction is mu N: sliding takes mu / sin(theta/2) of the load."""
     motion = wheel_above(4e-3, slip_rate=(0.5, 0.0))
-    out = wrench(motion, (1.0, 0.0), max_contact_length=1e-7, reference_length=1e-7, damping=0.0)
+    out = wrench(motion, (1.0, 0.0), max_contact_length=1e-7, reference_length=2e-7, damping=0.0)
     assert out[at.STATUS] == SLIP
     assert -out[at.CABLE_FORCE + 1] / out[at.WHEEL_FORCE + 2] == pytest.approx(0.7 / SIN, rel=1e-9)
     assert out[at.FRICTION_POWER] == pytest.approx(-out[at.CABLE_FORCE + 1] * 0.5, rel=1e-12)

@@ -110,11 +110,12 @@ def _reach(u_a, y, prm):
     """Return the ends, from the foot, of the piece of line on which contact is looked for.
 
     A point in the groove is nearer to the axle than the rim, so that half the piece is at most (R + d_c/2)/cos(θ/2) long
-    while the cable is less steep than the walls. This does not move with the motion: a piece cut at the rims would
+    while the cable is less steep than the walls; `max_contact_length` limits it, too. What touches lies on both sides of
+    the foot, so that a limit longer than all of it cuts nothing. This does not move with the motion: a piece cut at the rims would
     lose energy with what is cut. A steeper line is looked at between the rims.
     """
     half = (prm[at.WHEEL_RADIUS] + 0.5 * prm[at.CABLE_DIAMETER]) / prm[at.COSINE]
-    half = min(half, 0.5 * prm[at.MAX_LENGTH])
+    half = min(half, prm[at.MAX_LENGTH])
     rim, steep = 0.5 * prm[at.GROOVE_WIDTH], abs(u_a)
     if steep < prm[at.SINE] or abs(y) > rim:
         return -half, half

@@ -54,7 +54,7 @@ _PARAMETERS = [
     parameter(
         "reference_length", "m", 0.06, "length l0 that stiffness is of: stiffness / l0 acts per unit length", POSITIVE
     ),
-    parameter("max_contact_length", "m", 1.0, "upper limit of the contact length, which the geometry gives", POSITIVE),
+    parameter("max_contact_length", "m", 1.0, "the cable touches no farther than this from the wheel's foot", POSITIVE),
     parameter("tangential_stiffness", "N/m", 1e6, "stiffness of the friction bristle before it slides", POSITIVE),
     parameter(
         "tangential_damping",
