@@ -46,7 +46,7 @@ def test_other_masters_end_with_the_reason(master):
     """They cannot divide a step: the run ends before the line is passed, and says how long a step may be."""
     coupled = run_coupled(drop(0.02, 2.0, master, **HIGH))
     error = str(coupled.log.error)
-    assert "wheel and cable meet and move by 0.28 m" in error and "steps of at most 0.0024 s" in error
+    assert "wheel and cable meet and move by 0.28 m" in error and "steps of at most 0.0022 s" in error
     assert abs(coupled.table["time"][-1] - TOUCH) < 2.0 * 0.02
     assert coupled.table["contact1.normal_force_max"].max() == 0.0
 

@@ -139,7 +139,7 @@ def step(prm, method, inputs, t, h, nodes, weights, increments, state, path, mot
     prm : (15,); method : 0 point, 1 waveform, 2 hermite; inputs : (45,); t, h : s
     nodes, weights, increments : of `gauss_rule(m)`
     state : (43,), advanced; outputs : (42,), written
-    path, motions, samples, grid : (2, 4, 15), (m + 2, 24), (m + 2, 34), (m + 5, 4) work space
+    path, motions, samples, grid : (2, 4, 15), (m + 3, 24), (m + 2, 34), (m + 5, 4) work space
     way : (1,) m, receives how far wheel and cable move relative to each other in the step
 
     Returns
@@ -154,9 +154,6 @@ def step(prm, method, inputs, t, h, nodes, weights, increments, state, path, mot
     exchanged, inside = path[0], path[1]
     start_motion(state, start)
     _rebuild(method, start, inputs, h, exchanged, inside)
-    way[0], status = travel(prm, inside, h, curvature, nodes, motions[0], samples[0], grid[0])
-    if status != OK:
-        return status
     if method == POINT:
         status, dissipated = point_law(prm, exchanged, h, start, end, z, state[at.SLIDES] != 0.0, last)
         if status == OK:
@@ -165,12 +162,13 @@ def step(prm, method, inputs, t, h, nodes, weights, increments, state, path, mot
         status, dissipated = sample_law(prm, inside, h, nodes, weights, increments, end, curvature, z, motions, samples)
     if status != OK:
         return status
-    status = _look_back(prm, inside, t, h, nodes, weights, curvature, samples, grid, motions[0], state)
+    free = motions[m + 2]
+    way[0], status = travel(prm, inside, h, curvature, motions, m + 1, free, samples[m + 1], grid[0])
     if status != OK:
         return status
-    for i in range(m):  # the looks have used the first motion
-        motion_at(inside, nodes[i], h, motions[i])
-        bend(motions[i], curvature)
+    status = _look_back(prm, inside, t, h, nodes, weights, curvature, samples, grid, free, state)
+    if status != OK:
+        return status
     if method == POINT:
         _write_point(last, outputs)
     else:

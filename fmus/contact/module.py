@@ -175,7 +175,7 @@ class Contact:
         self._method = int(self._value("exchange"))
         self._nodes, self._weights, self._increments = gauss_rule(SAMPLES)
         self._path = np.zeros((2, *PATH_SHAPE))
-        self._motions = np.zeros((SAMPLES + 2, at.MOTION_SIZE))
+        self._motions = np.zeros((SAMPLES + 3, at.MOTION_SIZE))
         self._samples = np.zeros((SAMPLES + 2, at.OUT_SIZE))
         self._grid = np.zeros((SAMPLES + 5, N_LOOKS))
         self._way = np.zeros(1)
@@ -236,7 +236,7 @@ class Contact:
         return (
             f"contact at t = {t:g} s: wheel and cable meet and move by {self._way[0]:.3g} m relative to each other "
             f"within the step of {h:.3g} s, more than the groove is deep ({depth:.3g} m); take steps of at most "
-            f"{h * depth / self._way[0]:.2g} s, or an implicit master, which divides them"
+            f"{0.9 * h * depth / self._way[0]:.2g} s, or an implicit master, which divides them"
         )
 
     def _value(self, name: str) -> float:

@@ -73,7 +73,9 @@ def sample_law(prm, path, h, nodes, weights, increments, end, curvature, z, moti
 
 @kernel
 def sample_walls(prm, path, h, nodes, curvature, motions, samples):
-    """Write the motions and what the walls do at the Gauss points of a path; return the status of the law."""
+    """Write the motions at the Gauss points and the end of a path, and what the walls do at the Gauss points; return the
+    status of the law."""
+    motion_at(path, 1.0, h, motions[len(nodes)])
     for i in range(len(nodes)):
         motion_at(path, nodes[i], h, motions[i])
         bend(motions[i], curvature)

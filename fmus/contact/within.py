@@ -55,24 +55,25 @@ def _vertex(a, b, c, fa, fb, fc):
     left, right = (b - a) * (fb - fc), (b - c) * (fb - fa)
     if left == right:
         return b
-    x = b - 0.5 * ((b - a) * left - (b - c) * right) / (left - right)
-    return min(max(x, a), c)
+    return b - 0.5 * ((b - a) * left - (b - c) * right) / (left - right)
 
 
 @kernel
 def _top(prm, path, h, curvature, grid, column, motion, row, look, best):
-    """Look for the top of one column between the neighbours of its largest entry; return the status of the law."""
+    """Look for the top of one column between the neighbours of its largest entry; return the status of the law.
+
+    Where that is an end of the step, the parabola through the three entries there says whether it rises to an end.
+    """
     i, n = 0, grid.shape[0]
     for j in range(1, n):
         if grid[j, column] > grid[i, column]:
             i = j
-    low, high = max(i - 1, 0), min(i + 1, n - 1)
-    a, b, c = grid[low, SIGMA], grid[i, SIGMA], grid[high, SIGMA]
-    fa, fb, fc = grid[low, column], grid[i, column], grid[high, column]
-    for k in range(TOP_LOOKS):
-        inside = a < b and b < c
-        x = _vertex(a, b, c, fa, fb, fc) if inside else 0.5 * (a + c)
-        if abs(x - b) < 1e-3 * (c - a):
+    i = min(max(i, 1), n - 2)
+    a, b, c = grid[i - 1, SIGMA], grid[i, SIGMA], grid[i + 1, SIGMA]
+    fa, fb, fc = grid[i - 1, column], grid[i, column], grid[i + 1, column]
+    for _ in range(TOP_LOOKS):
+        x = _vertex(a, b, c, fa, fb, fc)
+        if not a < x < c or abs(x - b) < 1e-3 * (c - a):
             return OK
         status = _look(prm, path, x, h, curvature, motion, row, look)
         if status != OK:
@@ -85,8 +86,6 @@ def _top(prm, path, h, curvature, grid, column, motion, row, look, best):
             else:
                 a, fa = b, fb
             b, fb = x, f
-        elif not inside and k == 0:
-            return OK  # it falls from the end of the step on
         elif x < b:
             a, fa = x, f
         else:
@@ -186,24 +185,22 @@ def _first_touch(prm, path, h, curvature, looks, motion, row, look, deepest, bes
 
 
 @kernel
-def _apart(motion):
-    """Return the foot of the wheel less its centre."""
-    _length, _u, _offset, d = foot(motion)
-    return d
-
-
-@kernel
-def travel(prm, path, h, curvature, nodes, motion, row, look):
+def travel(prm, path, h, curvature, motions, n, motion, row, look):
     """Return how far wheel and cable move relative to each other in the step (m), and whether that is too far.
 
     Too far is farther than the groove is deep in a step in which they touch: the law would then see the contact at a few
     places that chance selects, or pass over it.
+
+    Parameters
+    ----------
+    motions : (n or more, 24) along the path, in any order
+    motion, row, look : work space
     """
+    way = 0.0
     motion_at(path, 0.0, h, motion)
-    d0, way = _apart(motion), 0.0
-    for i in range(len(nodes) + 1):
-        motion_at(path, nodes[i] if i < len(nodes) else 1.0, h, motion)
-        d = _apart(motion)
+    _length, _u, _offset, d0 = foot(motion)
+    for i in range(n):
+        _length, _u, _offset, d = foot(motions[i])
         way = max(way, math.sqrt((d[0] - d0[0]) ** 2 + (d[1] - d0[1]) ** 2 + (d[2] - d0[2]) ** 2))
     depth = groove_depth(prm)
     if not way > depth or not math.isfinite(way):

@@ -195,7 +195,7 @@ def _unresolved(impact: Mapping[str, Any]) -> str:
     return (
         f"{impact['contact']} meets the cable with {impact['speed']:.2g} m/s after t = {impact['time']:g} s, and the force of "
         f"such an impact rises within {rise:.2g} s, a quarter of the contact's period: the step of {step:.2g} s does not "
-        f"resolve it, the peak of its force is not known; take a macro step of at most {rise:.1g} s"
+        f"resolve it, the peak of its force is not known; take a macro step of at most {0.9 * rise:.2g} s"
     )
 
 
