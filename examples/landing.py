@@ -12,7 +12,8 @@ sensor = run.signals["contact1.radial_force"]  # their resultant: what a force s
 lowest = int(z.values.argmin())
 print(f"goes down by {z[0] - z[lowest]:.3f} {z.unit}, lowest at t = {z.time[lowest]:.2f} s")
 print(f"rolls up to {abs(roll.values).max():.4f} {roll.unit}")
-print(f"the walls press with up to {force.values.max():.0f} {force.unit} together, on the axle {sensor.values.max():.0f} N")
+print(f"the walls press with up to {force.values.max():.0f} {force.unit} together")
+print(f"a sensor in the axle sees up to {sensor.values.max():.0f} {sensor.unit}")
 
 # how wrong is this? The run says so itself, in each signal's unit
 for name, error in run.estimated_error.items():

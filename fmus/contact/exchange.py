@@ -12,7 +12,6 @@ from fmus.contact import places as at
 from fmus.contact.law import LEFT, OK, SLIP, STEEP, friction, walls
 from fmus.contact.path import hermite_path, motion_at, path_work, rotation_given, straight_path, waveform_path
 from fmus.contact.sampling import (
-    bend,
     passed_axle,
     point_law,
     project_force,

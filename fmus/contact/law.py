@@ -111,8 +111,8 @@ def _reach(u_a, y, prm):
 
     A point in the groove is nearer to the axle than the rim, so that half the piece is at most (R + d_c/2)/cos(θ/2) long
     while the cable is less steep than the walls; `max_contact_length` limits it, too. What touches lies on both sides of
-    the foot, so that a limit longer than all of it cuts nothing. This does not move with the motion: a piece cut at the rims would
-    lose energy with what is cut. A steeper line is looked at between the rims.
+    the foot, so that a limit longer than all of it cuts nothing. The ends do not move with the motion: a piece cut at the
+    rims would lose energy with what is cut. A steeper line is looked at between the rims.
     """
     half = (prm[at.WHEEL_RADIUS] + 0.5 * prm[at.CABLE_DIAMETER]) / prm[at.COSINE]
     half = min(half, prm[at.MAX_LENGTH])
