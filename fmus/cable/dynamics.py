@@ -25,7 +25,8 @@ def copy(source, target):
 def macro_step(model, collocation, alpha, use_alpha, state, h, longest, newton, ports, shown, out, rows, work):
     """Advance `state` by the macro step `h` with inner steps of at most `longest`, and write all outputs.
 
-    Newton's method ends at an estimated error `newton` of a coordinate, for a cable of 200 m; relative to the length. An inner step that does not converge is repeated at half its length, up to MAX_HALVINGS times.
+    Newton's method ends at an estimated error `newton` of a coordinate (m), for a cable of 200 m; in proportion to the
+    length. An inner step that does not converge is repeated at half its length, up to MAX_HALVINGS times.
 
     Parameters
     ----------
