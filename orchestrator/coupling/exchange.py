@@ -30,8 +30,6 @@ class Exchange:
     holds : whether an FMU that could take means takes its inputs as they are all the same
     order : of the error where the motion is smooth and the master implicit
     order_of_estimates : the order that is reckoned with, since touch, lift-off or slip may fall inside a step
-    inner_steps : steps that an expensive component makes in a macro step, so that their error shrinks with it as that of
-        the exchange does, and stays a tenth of it (docs/notebook/decisions.md)
     instead : the exchange for components that have no slopes or no means, if this one needs them
     """
 
@@ -40,7 +38,6 @@ class Exchange:
     means: bool
     order: int
     order_of_estimates: int
-    inner_steps: int
     instead: str = ""
     holds: bool = False
 
@@ -50,18 +47,30 @@ class Exchange:
             return EXCHANGES[self.instead].possible(slopes=slopes, means=means)
         return self
 
+    def inner_step(self, macro_step: float) -> float:
+        """Return the longest inner step (s) of an expensive component: its error falls as that of the exchange does.
 
+        Inner steps h have order 3, an exchange of order 4 allows h ~ H^(4/3): four of them in a macro step H of 2.5 ms,
+        three at 5 and 10 ms, two at 20 ms (docs/notebook/decisions.md). One of order 2 needs no more than one.
+        """
+        if self.order < 4:
+            return macro_step
+        return float(np.clip(INNER * (macro_step / AT) ** (4.0 / 3.0), 0.25 * macro_step, 0.5 * macro_step))
+
+
+INNER, AT = 1.7e-3, 5e-3
+"""s; the inner step that leaves a tenth of the flagship's error, at this macro step."""
 EXCHANGES = {
     row.name: row
     for row in (
-        Exchange("held", False, False, order=2, order_of_estimates=2, inner_steps=1, holds=True),
-        Exchange("point", False, False, order=2, order_of_estimates=2, inner_steps=1),
-        Exchange("hermite", True, False, order=4, order_of_estimates=2, inner_steps=4, instead="point"),
-        Exchange("waveform", True, True, order=4, order_of_estimates=3, inner_steps=4, instead="hermite"),
+        Exchange("held", False, False, order=2, order_of_estimates=2, holds=True),
+        Exchange("point", False, False, order=2, order_of_estimates=2),
+        Exchange("hermite", True, False, order=4, order_of_estimates=2, instead="point"),
+        Exchange("waveform", True, True, order=4, order_of_estimates=3, instead="hermite"),
     )
 }
 """What there is, from the coarsest to the finest (docs/concepts/exchange.md)."""
-OTHER = Exchange("", True, True, order=2, order_of_estimates=2, inner_steps=1)
+OTHER = Exchange("", True, True, order=2, order_of_estimates=2)
 """Of an FMU that says nothing or has an exchange of its own: whatever it has variables for."""
 EXPLICIT_ORDER = 1
 """Order of the error of an explicit master, at least, whatever the exchange."""

@@ -5,6 +5,9 @@ from __future__ import annotations
 from collections.abc import Iterator, Mapping
 from pathlib import Path
 
+import numpy as np
+
+from fmus.module.variables import Value
 from orchestrator.catalogue import library
 from orchestrator.coupling.exchange import (
     EXCHANGES,
@@ -17,8 +20,13 @@ from orchestrator.coupling.fmu.sub_steps import instance
 from orchestrator.coupling.graph.graph import Graph
 from orchestrator.coupling.graph.links import Connection
 from orchestrator.coupling.graph.supply import Missing, Supply
+from orchestrator.coupling.masters.options import master_options
 from orchestrator.landing.resolve import Landing
 
+TIGHTEST, LOOSEST = 1e-12, 1e-9
+"""m; range of the tolerance of Newton's method in a landing."""
+TOLERANCE = 3e-6
+"""Tolerance of a master that goes with it; at a smaller one Newton's method ends later."""
 LONGEST_ADAPTIVE = 2.5e-3
 """Longest inner step of our cable, s, where the master's steps are adaptive: long macro steps are then wanted, and the
 local error does not tell that of the cable's inner steps (docs/notebook/adaptive.md)."""
@@ -64,9 +72,24 @@ def _files(landing: Landing) -> dict[str, Path]:
     return foreign | dict(zip(ours, library.kept(ours.values()), strict=True))
 
 
+def _effort(landing: Landing, exchange: Exchange) -> dict[str, Value]:
+    """Return inner step and tolerance of our own cable: no more exact than the macro step and its iteration are."""
+    if landing.cable.foreign is not None:
+        return {}
+    return {"integration_step": inner_step(landing, exchange), "newton_tolerance": newton_tolerance(landing)}
+
+
+def newton_tolerance(landing: Landing) -> float:
+    """Return where Newton's method of our cable ends (m): 1e-9 at 20 ms, less at smaller steps and tolerances."""
+    simulation = landing.scenario.simulation
+    options = master_options()[simulation.master] | landing.scenario.master
+    share = min(1.0, float(options.get("tolerance") or TOLERANCE) / TOLERANCE)
+    return float(np.clip(LOOSEST * share * (simulation.macro_step / 0.02) ** 2, TIGHTEST, LOOSEST))
+
+
 def inner_step(landing: Landing, exchange: Exchange) -> float:
     """Return the longest inner step (s) of our own cable where the scenario gives none."""
-    step = landing.scenario.simulation.macro_step / exchange.inner_steps
+    step = exchange.inner_step(landing.scenario.simulation.macro_step)
     return min(step, LONGEST_ADAPTIVE) if landing.scenario.master.get("local_tolerance") else step
 
 

@@ -16,6 +16,7 @@ from orchestrator.coupling.run.compare import (
 )
 from orchestrator.coupling.run.results import Table
 from orchestrator.landing.audit import Audit, of_monolithic
+from orchestrator.landing.intervals import coarsened
 from orchestrator.runs.errors import CONSTANT, Parts, differences, judged
 from orchestrator.runs.result import EXIT_STATUS, Run, Verdict, pandas_module, run_label
 from orchestrator.runs.systems import left_out
@@ -239,7 +240,7 @@ def held_against(run: Run, reference: Reference) -> RunErrors:
         unconverged_steps=summary["unconverged_steps"],
         cable_steps=solves.get("cable", max(solves.values(), default=0)),
         wall_s=summary["wall_s"],
-        signals=signal_errors(run.table, reference.table),
+        signals=signal_errors(run.table, coarsened(reference.table, run.time)),
         errors=reference.parts(run.table, judged(run.table, run.tolerances)),
     )
 

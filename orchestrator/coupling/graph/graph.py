@@ -140,16 +140,18 @@ class Graph(Arrays):
         """Initialise all FMUs consistently: values go along the connections, algebraic loops are solved.
 
         Many FMUs know their outputs only after their initialisation. So each leaves it in turn, in the order of
-        execution, with what the ones before it show by then.
+        execution, with what the ones before it show by then; where not all did at once, values go round once more before.
         """
         used = [node.name for node in self.nodes if node.fmu.initialized]
         if used:
             raise GraphError(f"{used[0]} has been started before, and FMUs cannot start anew; load the FMUs once more")
         for node in self.nodes:
             node.fmu.enter_initialization(start, stop)
-        if self._settled(self.initial_stages) and self.loop.places.size:
+        settled = self._settled(self.initial_stages)
+        if settled and self.loop.places.size:
             self.loop.solve(start)
         for node in self.nodes:
+            settled = settled or self._settled(self.initial_stages)
             node.receive_all(self.y)
             node.inputs.set()
             node.fmu.exit_initialization()
