@@ -17,9 +17,8 @@ from orchestrator.coupling.run.compare import (
 from orchestrator.coupling.run.results import Table
 from orchestrator.landing.audit import Audit, of_monolithic
 from orchestrator.landing.intervals import coarsened
-from orchestrator.runs.errors import CONSTANT, Parts, differences, judged
+from orchestrator.runs.errors import CONSTANT, Parts, differences, judged, left_out
 from orchestrator.runs.result import EXIT_STATUS, Run, Verdict, pandas_module, run_label
-from orchestrator.runs.systems import left_out
 
 REFERENCE_MARGIN = 0.1
 """The reference's own error may be this part of a tolerance, or the verdict means nothing."""

@@ -26,8 +26,8 @@ from orchestrator.coupling.masters.options import master_options
 from orchestrator.coupling.run.interrupt import Interruption, interruptible
 from orchestrator.coupling.run.results import Table
 from orchestrator.runs.coupled import Coupled, Interrupted, Reached, completed
-from orchestrator.runs.errors import NAMES, Differences, Parts, differences, judged
-from orchestrator.runs.systems import System, left_out
+from orchestrator.runs.errors import NAMES, Differences, Parts, differences, judged, left_out
+from orchestrator.runs.systems import System
 from orchestrator.scenario.types import Scenario
 
 RATIOS = {"finer": 0.5, "coarser": 2.0}

@@ -19,9 +19,9 @@ from orchestrator.landing.monolithic import Problem
 from orchestrator.runs.compare import Reference
 from orchestrator.runs.components import is_idle, opened
 from orchestrator.runs.coupled import Interrupted, Reached, completed
-from orchestrator.runs.errors import differences, judged
+from orchestrator.runs.errors import differences, judged, left_out
 from orchestrator.runs.estimate import solved
-from orchestrator.runs.systems import System, left_out, resolve
+from orchestrator.runs.systems import System, resolve
 from orchestrator.scenario.types import DEFAULT_MASTER, Scenario
 
 FINER_MESH = 2.0

@@ -49,9 +49,6 @@ Stepped = TypeVar("Stepped", CableSection, RobotSection, Component)
 
 MESH_RATIO = 1.5
 """Number of elements of a finer mesh over that of the run's."""
-MESH_ORDER = 3
-"""Order of the error in the element length that is reckoned with: 4 where the motion is smooth, less where an impact makes
-waves shorter than the elements."""
 
 
 @dataclass(frozen=True)
@@ -66,11 +63,6 @@ class Meshed:
 
     system: System
     ratio: float
-
-
-def left_out(ratio: float) -> float:
-    """Return what the difference from a mesh `ratio` times as fine is multiplied by to have the error of the coarser one."""
-    return 1.0 / (1.0 - ratio**-MESH_ORDER)
 
 
 class System(Protocol):
