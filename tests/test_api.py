@@ -148,7 +148,7 @@ def test_progress_is_told():
     told = []
     orchestrator.run(OSCILLATOR, stop=0.1, macro_step=0.05, progress=lambda *what: told.append(what))
     assert told[:2] == [("iqn_ils_0.05s", 0.05, 0.1), ("iqn_ils_0.05s", 0.1, 0.1)]
-    assert {task for task, _, _ in told[2:]} == {"error estimate: coupling"}
+    assert {task for task, _, _ in told[2:]} == {"error estimate: coupling and macro step"}
 
 
 def test_a_run_in_a_thread(oscillator: orchestrator.Run):

@@ -262,3 +262,15 @@ def test_failure_of_the_second_run_is_said(monkeypatch):
 def test_unknown_estimate_names_those_there_are():
     with pytest.raises(InputError, match="'richardson' must be 'finer', 'coarser' or 'none'"):
         landing("simulation.estimate=richardson")
+
+
+def test_inner_steps_are_spared_where_they_are_a_trifle():
+    """From a fifth of the run, and from the whole of it: the same within a factor 3, and a trifle in both."""
+    system = landing(stop=0.6)
+    coupled, whole = run_coupled(system), run_coupled(system)
+    estimate_error(coupled)
+    whole_parts = estimate._scaled(whole, run_coupled(system.stepped(0.5)).table, estimate.OF_INNER_STEPS)
+    for name in ("robot.body.position.z", "contact1.normal_force_max"):
+        parts = coupled.error_parts[name]
+        assert parts.inner_steps is not None and parts.inner_steps < estimate.TRIFLE * parts.total
+        assert 1 / 3 < parts.inner_steps / whole_parts[name] < 3 or whole_parts[name] < 1e-3 * parts.total

@@ -26,7 +26,7 @@ from orchestrator.coupling.masters.options import master_options
 from orchestrator.coupling.run.interrupt import Interruption, interruptible
 from orchestrator.coupling.run.results import Table
 from orchestrator.runs.coupled import Coupled, Interrupted, Reached, completed
-from orchestrator.runs.errors import NAMES, Differences, Parts, differences, judged, left_out
+from orchestrator.runs.errors import NAMES, Differences, Parts, differences, judged, left_out, range_of
 from orchestrator.runs.systems import System
 from orchestrator.scenario.types import Scenario
 
@@ -35,10 +35,17 @@ RATIOS = {"finer": 0.5, "coarser": 2.0}
 TOLERANCES = {"tolerance": 10.0, "local_tolerance": 32.0}
 """By this the master's tolerances are multiplied where steps are doubled, and divided where they are halved: the error of
 the iteration changes about as much as that of the steps, a local error of order 5 as by doubled sub-steps."""
-INNER_ORDER = 3
-"""Order of the error of inner steps: that of our cable's collocation."""
+OF_INNER_STEPS = 1.0 / (1.0 - 0.5**3)
+"""Factor of the difference from a run of half the inner steps: order 3, that of our cable's collocation."""
+BEGINNING, ENOUGH, TRIFLE = 0.2, 20, 0.03
+"""Share of a run, of so many macro steps at least, whose inner steps are looked at first; where they have less than this
+share of the error, or of the tolerance, the rest is spared."""
 MESH_TOLERANCE = 1e-6
 """m; local error of a monolithic step, which leaves 3e-7 of the flagship's range: a hundredth of what a mesh leaves."""
+Found = dict[str, Differences | None]
+"""Part → its errors."""
+Kept = list[Coupled]
+"""Holds the second run, once it is made."""
 Told = Callable[[str], Reached]
 """Returns what is told the time that the run for a part has come to."""
 
@@ -90,20 +97,19 @@ def estimate_error(coupled: Coupled, told: Told = lambda _: lambda _: None) -> C
     again = second(coupled.system) if coupled.log.error is None else None
     if again is None:
         return None
-    others: list[Coupled] = []
-    signals = judged(coupled.table, coupled.scenario.simulation.tolerances)
-    wanted = {
-        "coupling": lambda: _of_coupling(coupled, again, others, told("coupling")),
-        "inner_steps": lambda: _of_inner_steps(coupled, told("inner steps")),
-        "mesh": lambda: _of_mesh(coupled, told("mesh")),
+    found, second_run = Found(), Kept()
+    makers = {
+        "coupling": lambda: _of_coupling(coupled, again, second_run, told(NAMES["coupling"])),
+        "mesh": lambda: _of_mesh(coupled, told(NAMES["mesh"])),
+        "inner_steps": lambda: _of_inner_steps(coupled, second_run, found, told(NAMES["inner_steps"])),
     }
-    found: dict[str, Differences | None] = {}
-    for part, make in wanted.items():
+    for part, make in makers.items():
         found[part], goes_on = _attempted(coupled, part, make)
         if not goes_on:
             break
-    coupled.error_parts = {name: _parts([(found.get(p) or {}).get(name) for p in wanted]) for name in signals}
-    return others[0] if others else None
+    signals = judged(coupled.table, coupled.scenario.simulation.tolerances)
+    coupled.error_parts = {name: _parts([(found.get(p) or {}).get(name) for p in NAMES]) for name in signals}
+    return second_run[0] if second_run else None
 
 
 def _attempted(coupled: Coupled, part: str, make: Callable[[], Differences | None]) -> tuple[Differences | None, bool]:
@@ -127,18 +133,53 @@ def _parts(values: Sequence[float | None]) -> Parts:
 # -- the parts ------------------------------------------------------------------------------------------------
 
 
-def _of_coupling(coupled: Coupled, again: System, kept: list[Coupled], progress: Reached) -> Differences:
+def _of_coupling(coupled: Coupled, again: System, kept: Kept, progress: Reached) -> Differences:
     other = completed(again, progress)
     kept.append(other)
     return _scaled(coupled, other.table, factor(coupled.scenario, coupled.exchange))
 
 
-def _of_inner_steps(coupled: Coupled, progress: Reached) -> Differences | None:
+def _of_inner_steps(coupled: Coupled, second_run: Kept, found: Found, progress: Reached) -> Differences | None:
     """Return the errors of the inner steps; None where no component has them, or a coarser run has shown them already."""
     again = coupled.system.stepped(0.5)
     if coupled.scenario.simulation.estimate == "coarser" or again.scenario == coupled.scenario:
         return None
-    return _scaled(coupled, completed(again, progress).table, 1.0 / (1.0 - 0.5**INNER_ORDER))
+    steps = int(BEGINNING * (len(coupled.table["time"]) - 1))
+    if second_run and found["coupling"] is not None and steps >= ENOUGH:
+        small = _where_small(coupled, again, second_run[0], found, steps, progress)
+        if small is not None:
+            return small
+    return _scaled(coupled, completed(again, progress).table, OF_INNER_STEPS)
+
+
+def _where_small(
+    coupled: Coupled, again: System, second_run: Coupled, found: Found, steps: int, progress: Reached
+) -> Differences | None:
+    """Return the errors of the inner steps from the run's beginning alone; None where they may be more than a trifle.
+
+    What they are of the coupling's there they are taken to be in the end.
+    """
+    end = coupled.table["time"][steps]
+    begun, second_begun = (_until(table, end) for table in (coupled.table, second_run.table))
+    brief = completed(again.changed(dict(coupled.scenario.master), stop_time=float(end)), progress).table
+    names = judged(coupled.table, coupled.scenario.simulation.tolerances)
+    inner, coupling = differences(begun, brief, names), differences(begun, second_begun, names)
+    whole, by = found["coupling"] or {}, OF_INNER_STEPS / factor(coupled.scenario, coupled.exchange)
+    errors: Differences = {}
+    for name in names:
+        ratio = inner[name] / coupling[name] if coupling[name] > 0.0 else 0.0
+        errors[name] = max(by * ratio * whole[name], OF_INNER_STEPS * inner[name])
+        known = sum((part or {}).get(name, 0.0) for part in found.values())
+        tolerance = coupled.scenario.simulation.tolerances.get(name, 0.0)
+        if not errors[name] <= TRIFLE * max(known, tolerance * range_of(coupled.table[name])):
+            return None
+    return errors
+
+
+def _until(table: Table, end: float) -> Table:
+    """Return the rows of a table up to the time `end`."""
+    rows = table["time"] <= end * (1.0 + 1e-9)
+    return {name: values[rows] for name, values in table.items()}
 
 
 def _of_mesh(coupled: Coupled, progress: Reached) -> Differences | None:
