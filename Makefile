@@ -29,15 +29,18 @@ run: env
 	$(BIN)/orchestrator build
 	$(BIN)/orchestrator compare landing_200m_point9
 
+# files of tests side by side, on as many processors as there are, but no more than four
+PYTEST := $(BIN)/python -m pytest -n auto --maxprocesses 4 --dist loadfile
+
 test: env
 	@$(BIN)/python -m fmus.face.first_use
-	$(BIN)/python -m pytest -q
+	$(PYTEST) -q
 
 test-wheel: env
 	$(BIN)/python -m pytest -q -m slow tests/test_wheel.py
 
 # what hangs on how a processor rounds, with other kernels than this machine's own; see docs/portability.md
-PORTABLE := $(BIN)/python -m pytest -m 'portable and not slow'
+PORTABLE := $(PYTEST) -m 'portable and not slow'
 
 test-generic: env
 	GLIBC_TUNABLES=glibc.cpu.hwcaps=-AVX2,-FMA NUMBA_CPU_NAME=generic $(PORTABLE)

@@ -11,6 +11,8 @@ import scipy.linalg  # brings its own BLAS
 from hypothesis import settings
 from threadpoolctl import threadpool_info
 
+from fmus.kernels import notice
+
 settings.register_profile("repeatable", deadline=None, derandomize=True)
 settings.register_profile("searching", deadline=None)
 settings.load_profile("repeatable")
@@ -33,3 +35,9 @@ def pytest_report_header() -> str:
     """Return for which processors the kernels are made that run here."""
     processor = numba.config.CPU_NAME or llvm.get_host_cpu_name()  # type: ignore[attr-defined]
     return f"kernels: {processor}; BLAS: {', '.join(sorted(blas_kernels())) or 'unknown'}"
+
+
+@pytest.fixture(autouse=True)
+def heard(monkeypatch: pytest.MonkeyPatch) -> None:
+    """Let every test hear notices, whatever ``--quiet`` one before it has said."""
+    monkeypatch.setattr(notice, "muted", False)

@@ -137,7 +137,7 @@ def test_the_flagships_mesh_leaves_what_it_says():
 
 def test_a_smaller_tolerance_asks_for_a_finer_mesh():
     """Half of the smallest tolerance is left to the mesh: (5e-4 / 5e-5)^(1/4) = 1.78 times the elements."""
-    meshes = [landing(f'simulation.tolerances."robot.roll"={t}').landing.mesh for t in (1e-2, 1e-4)]
+    meshes = [landing(f"simulation.tolerances.robot.roll={t}").landing.mesh for t in (1e-2, 1e-4)]
     assert meshes[0] is not None and meshes[1] is not None
     assert meshes[1].n_elements == pytest.approx(10**0.25 * meshes[0].n_elements, abs=1.0)
 

@@ -97,7 +97,7 @@ def test_explicit_coupling_is_caught():
 
     Eight times what is allowed, the interface's share twice that of the contact.
     """
-    values = {"contact__parameters__stiffness": 1e9}
+    values = {"contact__parameters__stiffness": 1e9, "simulation__tolerances__robot__body__position__z": 1e-4}
     coupled = run_coupled(scenario("drop_5cm", stop=0.3, master="jacobi", macro_step=1e-3, **values))
     assert not coupled.energy.within
     assert "interface contact1" in coupled.energy.warning()
