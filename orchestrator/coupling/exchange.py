@@ -50,16 +50,16 @@ class Exchange:
     def inner_step(self, macro_step: float) -> float:
         """Return the longest inner step (s) of an expensive component: its error falls as that of the exchange does.
 
-        Inner steps h have order 3, an exchange of order 4 allows h ~ H^(4/3): four of them in a macro step H of 2.5 ms,
-        three at 5 and 10 ms, two at 20 ms (docs/notebook/decisions.md). One of order 2 needs no more than one.
+        Inner steps h have order 3, an exchange of order 4 allows h ~ H^(4/3): four of them in a macro step H of up to 10 ms,
+        three at 20 ms, two at 40 ms (docs/notebook/decisions.md). One of order 2 needs no more than one.
         """
         if self.order < 4:
             return macro_step
         return float(np.clip(INNER * (macro_step / AT) ** (4.0 / 3.0), 0.25 * macro_step, 0.5 * macro_step))
 
 
-INNER, AT = 1.7e-3, 5e-3
-"""s; the inner step that leaves a tenth of the flagship's error, at this macro step."""
+INNER, AT = 1.25e-3, 5e-3
+"""s; the inner step that leaves less than half of the flagship's error over 25 s, at this macro step."""
 EXCHANGES = {
     row.name: row
     for row in (

@@ -25,7 +25,7 @@ from orchestrator.landing.resolve import Landing
 
 TIGHTEST, LOOSEST = 1e-12, 1e-9
 """m; range of the tolerance of Newton's method in a landing."""
-TOLERANCE = 3e-6
+TOLERANCE = 1e-6
 """Tolerance of a master that goes with it; at a smaller one Newton's method ends later."""
 LONGEST_ADAPTIVE = 2.5e-3
 """Longest inner step of our cable, s, where the master's steps are adaptive: long macro steps are then wanted, and the

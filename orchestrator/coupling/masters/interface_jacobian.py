@@ -41,7 +41,6 @@ class InterfaceJacobian(Implicit):
 
     Parameters
     ----------
-    tolerance : three times that of other masters: after a step of Newton's method the error is far below the residual
     reuse : macro steps whose columns the inner iteration keeps, those of all its solves in a step
     difference : step of the differences, relative to the magnitude of the unknown (at least 1 in its unit)
     slow : outer iterations after which J is made anew
@@ -61,7 +60,6 @@ class InterfaceJacobian(Implicit):
         self,
         graph: Graph,
         *,
-        tolerance: Positive = 3e-6,
         reuse: Count = 8,
         threshold: NonNegative = 1e-6,
         relaxation: Positive = 0.1,
@@ -73,7 +71,7 @@ class InterfaceJacobian(Implicit):
         **options: Any,
     ):
         self.inner = LeastSquares(graph.torn.size, reuse, threshold, relaxation)
-        super().__init__(graph, self.inner, tolerance=tolerance, max_iterations=max_iterations, **options)
+        super().__init__(graph, self.inner, max_iterations=max_iterations, **options)
         self.difference, self.slow = difference, slow
         self.inner_tolerance, self.inner_iterations = inner_tolerance, inner_iterations
         self.models = [Model(graph, node, self.between) for node in graph.nodes if not node.forward.size and node.torn]
