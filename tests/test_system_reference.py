@@ -143,4 +143,7 @@ def test_the_estimate_bounds_the_true_error(name, stop):
         if signal.endswith("status") or np.ptp(truth[signal]) < 1e-9 * (1.0 + np.max(np.abs(truth[signal]))):
             continue
         error = np.max(np.abs(values - truth[signal]))
-        assert error <= 1.1 * solution.estimated_error[signal] + 1e-12 * np.max(np.abs(truth[signal])), signal
+        round_off = 1e-12 * np.max(np.abs(truth[signal]))
+        if signal.endswith("touch_time"):  # rounding leaves a gap of 1e-15 m or none: fallen through in 1.4e-8 s
+            round_off = np.sqrt(2.0 * 1e-15 / 9.8)
+        assert error <= 1.1 * solution.estimated_error[signal] + round_off, signal
