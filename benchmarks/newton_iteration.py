@@ -48,6 +48,7 @@ def solutions(band, x, number):
 def contestants() -> dict[str, Callable[[], object]]:
     """Return what is measured; each call does it NUMBER times."""
     cable = Cable()
+    cable.table.assign(cable.values, {"n_elements": 20})
     cable.initialize(0.0)
     model, work = cable.model, make_work(cable.model.weight.size, cable.state.size)
     n, h = model.weight.size, 0.0025
@@ -78,7 +79,8 @@ class Swing:
 
     def __init__(self, integrator: str):
         self.cable, self.k = Cable(), 0
-        settings: dict[str, Value] = {"integrator": integrator, "port[1].s": 60.0, "port[1].force.z": -372.0}
+        load: dict[str, Value] = {"port[1].s": 60.0, "port[1].force.z": -372.0}
+        settings = load | {"integrator": integrator, "n_elements": 20}
         self.cable.table.assign(self.cable.values, settings)
         self.cable.initialize(0.0)
 
