@@ -269,7 +269,9 @@ def test_inner_steps_are_spared_where_they_are_a_trifle():
     system = landing(stop=0.6)
     coupled, whole = run_coupled(system), run_coupled(system)
     estimate_error(coupled)
-    whole_parts = estimate._scaled(whole, run_coupled(system.stepped(0.5)).table, estimate.OF_INNER_STEPS)
+    whole_parts = estimate._scaled(
+        whole.table, run_coupled(system.stepped(0.5)).table, whole.judged, estimate.OF_INNER_STEPS
+    )
     for name in ("robot.body.position.z", "contact1.normal_force_max"):
         parts = coupled.error_parts[name]
         assert parts.inner_steps is not None and parts.inner_steps < estimate.TRIFLE * parts.total

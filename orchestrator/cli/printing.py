@@ -61,7 +61,7 @@ def _print_estimates(run: Run) -> None:
 
 
 def _error_row(name: str, parts: Parts, scale: float, run: Run) -> tuple[str, ...]:
-    shares = [None if part is None else part / scale for part in (parts.coupling, parts.inner_steps, parts.mesh)]
+    shares = [None if part is None else part / scale for part in parts.by_part.values()]
     cells = ["–" if share is None else _share(share) for share in (*shares, parts.total / scale)]
     tolerance = run.tolerances.get(name)
     if tolerance is None:

@@ -198,9 +198,7 @@ def _summary_rows(run: Run) -> list[tuple[str, ...]]:
 def _error_words(parts: Parts) -> str:
     if isnan(parts.total):
         return "not known"
-    values = (
-        f"{words} {getattr(parts, part):.2e}" for part, words in NAMES.items() if getattr(parts, part) is not None
-    )
+    values = (f"{NAMES[part]} {value:.2e}" for part, value in parts.known.items())
     return f"{parts.total:.2e} ({', '.join(values)})"
 
 

@@ -20,7 +20,7 @@ from orchestrator.coupling.run.results import Table
 from orchestrator.coupling.run.simulate import simulate
 from orchestrator.landing import audit
 from orchestrator.runs.components import master_of, opened, recorded
-from orchestrator.runs.errors import Parts, missed
+from orchestrator.runs.errors import Parts, judged, missed
 from orchestrator.runs.systems import System, resolve
 from orchestrator.scenario.types import Scenario
 
@@ -66,6 +66,11 @@ class Coupled:
     def estimated_error(self) -> dict[str, float]:
         """Estimated error by signal, in its unit: the sum of its parts, NaN where one is not known."""
         return {name: parts.total for name, parts in self.error_parts.items()}
+
+    @property
+    def judged(self) -> list[str]:
+        """The signals whose error is estimated."""
+        return judged(self.table, self.scenario.simulation.tolerances)
 
     @property
     def misses(self) -> list[str]:

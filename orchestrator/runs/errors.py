@@ -51,15 +51,24 @@ class Parts:
     total: float
 
     @property
+    def by_part(self) -> dict[str, float | None]:
+        """Part → its value, in the order of `NAMES`."""
+        return {part: getattr(self, part) for part in NAMES}
+
+    @property
+    def known(self) -> dict[str, float]:
+        """The parts that there are."""
+        return {part: value for part, value in self.by_part.items() if value is not None}
+
+    @property
     def covered(self) -> list[str]:
         """What the total covers, in words."""
-        return [words for part, words in NAMES.items() if getattr(self, part) is not None]
+        return [NAMES[part] for part in self.known]
 
     @property
     def largest(self) -> str:
         """The part that is most of the total."""
-        known = {part: getattr(self, part) for part in NAMES}
-        return max((part for part, value in known.items() if value is not None), key=lambda part: known[part])
+        return max(self.known, key=self.known.__getitem__)
 
     def content(self) -> dict[str, Any]:
         """Return what is written of it."""

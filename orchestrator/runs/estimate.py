@@ -26,7 +26,7 @@ from orchestrator.coupling.masters.options import master_options
 from orchestrator.coupling.run.interrupt import Interruption, interruptible
 from orchestrator.coupling.run.results import Table
 from orchestrator.runs.coupled import Coupled, Interrupted, Reached, completed
-from orchestrator.runs.errors import NAMES, Differences, Parts, differences, judged, left_out, range_of
+from orchestrator.runs.errors import NAMES, Differences, Parts, differences, left_out, range_of
 from orchestrator.runs.systems import System
 from orchestrator.scenario.types import Scenario
 
@@ -107,8 +107,7 @@ def estimate_error(coupled: Coupled, told: Told = lambda _: lambda _: None) -> C
         found[part], goes_on = _attempted(coupled, part, make)
         if not goes_on:
             break
-    signals = judged(coupled.table, coupled.scenario.simulation.tolerances)
-    coupled.error_parts = {name: _parts([(found.get(p) or {}).get(name) for p in NAMES]) for name in signals}
+    coupled.error_parts = {n: _parts([(found.get(part) or {}).get(n) for part in NAMES]) for n in coupled.judged}
     return second_run[0] if second_run else None
 
 
@@ -121,8 +120,7 @@ def _attempted(coupled: Coupled, part: str, make: Callable[[], Differences | Non
         return make(), True
     except (OrchestratorError, ModuleError) as error:
         coupled.estimate_failure += f"{'; ' if coupled.estimate_failure else ''}{NAMES[part]}: {error}"
-        unknown = dict.fromkeys(judged(coupled.table, coupled.scenario.simulation.tolerances), float("nan"))
-        return unknown, not isinstance(error, Interrupted)
+        return dict.fromkeys(coupled.judged, float("nan")), not isinstance(error, Interrupted)
 
 
 def _parts(values: Sequence[float | None]) -> Parts:
@@ -136,7 +134,7 @@ def _parts(values: Sequence[float | None]) -> Parts:
 def _of_coupling(coupled: Coupled, again: System, kept: Kept, progress: Reached) -> Differences:
     other = completed(again, progress)
     kept.append(other)
-    return _scaled(coupled, other.table, factor(coupled.scenario, coupled.exchange))
+    return _scaled(coupled.table, other.table, coupled.judged, factor(coupled.scenario, coupled.exchange))
 
 
 def _of_inner_steps(coupled: Coupled, second_run: Kept, found: Found, progress: Reached) -> Differences | None:
@@ -149,7 +147,7 @@ def _of_inner_steps(coupled: Coupled, second_run: Kept, found: Found, progress: 
         small = _where_small(coupled, again, second_run[0], found, steps, progress)
         if small is not None:
             return small
-    return _scaled(coupled, completed(again, progress).table, OF_INNER_STEPS)
+    return _scaled(coupled.table, completed(again, progress).table, coupled.judged, OF_INNER_STEPS)
 
 
 def _where_small(
@@ -162,7 +160,7 @@ def _where_small(
     end = coupled.table["time"][steps]
     begun, second_begun = (_until(table, end) for table in (coupled.table, second_run.table))
     brief = completed(again.changed(dict(coupled.scenario.master), stop_time=float(end)), progress).table
-    names = judged(coupled.table, coupled.scenario.simulation.tolerances)
+    names = coupled.judged
     inner, coupling = differences(begun, brief, names), differences(begun, second_begun, names)
     whole, by = found["coupling"] or {}, OF_INNER_STEPS / factor(coupled.scenario, coupled.exchange)
     errors: Differences = {}
@@ -190,10 +188,9 @@ def _of_mesh(coupled: Coupled, progress: Reached) -> Differences | None:
         return None
     by = left_out(finer.ratio)
     if system.problem() is None or finer.system.problem() is None:
-        return _scaled(coupled, completed(finer.system, progress).table, by)
+        return _scaled(coupled.table, completed(finer.system, progress).table, coupled.judged, by)
     own, fine = (solved(one, coupled.table["time"], progress) for one in (system, finer.system))
-    names = judged(coupled.table, coupled.scenario.simulation.tolerances)
-    return {name: by * value for name, value in differences(own, fine, names).items()}
+    return _scaled(own, fine, coupled.judged, by)
 
 
 def solved(system: System, times: np.ndarray, progress: Reached, tolerance: float = MESH_TOLERANCE) -> Table:
@@ -220,6 +217,5 @@ def _both(first: Reached, second: Reached) -> Reached:
     return told
 
 
-def _scaled(coupled: Coupled, other: Table, by: float) -> Differences:
-    names = judged(coupled.table, coupled.scenario.simulation.tolerances)
-    return {name: by * value for name, value in differences(coupled.table, other, names).items()}
+def _scaled(table: Table, other: Table, names: Sequence[str], by: float) -> Differences:
+    return {name: by * value for name, value in differences(table, other, names).items()}
