@@ -1,10 +1,11 @@
-"""What there is to choose from, with a line each: scenarios, robots, conductors, masters."""
+"""What there is to choose from, with a line each: scenarios, robots, conductors, contact stiffness sets, masters."""
 
 from __future__ import annotations
 
 from collections.abc import Callable
 
 from orchestrator.catalogue import conductor_spec, robot_spec
+from orchestrator.catalogue import contact_sets as sets
 from orchestrator.catalogue import scenarios as shipped
 from orchestrator.catalogue.documents import chain
 from orchestrator.coupling.errors import InputError
@@ -28,6 +29,11 @@ def conductors() -> dict[str, str]:
 def _conductor(name: str) -> str:
     spec = conductor_spec.load_conductor(name)
     return f"{spec.title} ({', '.join(spec.stiffness_sets)})"
+
+
+def contact_sets() -> dict[str, str]:
+    """Return the titles of the contact's stiffness sets by name; what is wrong with a faulty one in its title's place."""
+    return {name: _or_fault(lambda name=name: sets.load_set(name).title) for name in sets.names()}
 
 
 def masters() -> dict[str, str]:

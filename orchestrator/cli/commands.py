@@ -96,11 +96,11 @@ def build(
 
 @app.command("list")
 def list_() -> None:
-    """List scenarios, robots, conductors and masters."""
+    """List scenarios, robots, conductors, contact stiffness sets and masters."""
     from orchestrator.catalogue import listing
 
-    groups = {"Scenarios": listing.scenarios(), "Robots": listing.robots()}
-    groups |= {"Conductors": listing.conductors(), "Masters": listing.masters()}
+    groups = {"Scenarios": listing.scenarios(), "Robots": listing.robots(), "Conductors": listing.conductors()}
+    groups |= {"Contact stiffness sets": listing.contact_sets(), "Masters": listing.masters()}
     printing.print_catalogue(groups)
 
 
