@@ -141,12 +141,8 @@ def test_the_worst_of_each_limit_with_its_time_and_wheel(name: str):
     found = safety.limits[name]
     assert (found.worst, found.time, found.wheel) == (pytest.approx(worst, rel=1e-9), pytest.approx(time), wheel)
     assert found.margin == pytest.approx(found.limit - abs(worst)) and found.margin < 0.0
-    assert (
-        safety.safe is False
-        and safety.named("exceeded") == [name]
-        
+    assert safety.safe is False and safety.named("exceeded") == [name]
     assert safety.words == f"NOT SAFE until 10 s: {name} exceeded"
-    )
 
 
 def test_a_landing_within_all_limits_is_safe():
