@@ -96,10 +96,11 @@ def build(
 
 @app.command("list")
 def list_() -> None:
-    """List scenarios, robots and masters."""
+    """List scenarios, robots, contact stiffness sets and masters."""
     from orchestrator.catalogue import listing
 
-    groups = {"Scenarios": listing.scenarios(), "Robots": listing.robots(), "Masters": listing.masters()}
+    groups = {"Scenarios": listing.scenarios(), "Robots": listing.robots()}
+    groups |= {"Contact stiffness sets": listing.contact_sets(), "Masters": listing.masters()}
     printing.print_catalogue(groups)
 
 

@@ -105,9 +105,13 @@ class RobotSection(Section):
 
 
 class ContactSection(Section):
-    """The wheel contact; one instance a wheel is made from it."""
+    """The wheel contact; one instance a wheel is made from it.
+
+    `stiffness_set` : a set of the catalogue; its parameters are those that the scenario does not give itself
+    """
 
     fmu: str | None = None
+    stiffness_set: str | None = None
     parameters: Settings = {}
 
 
