@@ -125,6 +125,21 @@ def validate(scenario: options.Scenario, robot: options.Robot = None, set_: opti
 
 
 @app.command()
+def limits(scenario: options.Scenario, robot: options.Robot = None, set_: options.Set = None) -> None:
+    """What a landing is judged by: each limit with its formula, numbers and source; nothing is run."""
+    with importing():
+        from orchestrator.api import load_scenario
+        from orchestrator.landing.limits import landing_only, limits_of, roll_range
+        from orchestrator.landing.resolve import resolve
+
+    landing = resolve(landing_only(load_scenario(scenario, set=set_, robot=robot)))
+    found = limits_of(landing)
+    printing.print_limits(found)
+    for line in roll_range(landing, found):
+        print(line)
+
+
+@app.command()
 def check(
     fmu: Annotated[Path, typer.Argument(metavar="FILE.fmu", help="The FMU.")],
     contract: Annotated[
