@@ -96,10 +96,10 @@ def build(
 
 @app.command("list")
 def list_() -> None:
-    """List scenarios, robots, contact stiffness sets and masters."""
+    """List scenarios, robots, conductors, contact stiffness sets and masters."""
     from orchestrator.catalogue import listing
 
-    groups = {"Scenarios": listing.scenarios(), "Robots": listing.robots()}
+    groups = {"Scenarios": listing.scenarios(), "Robots": listing.robots(), "Conductors": listing.conductors()}
     groups |= {"Contact stiffness sets": listing.contact_sets(), "Masters": listing.masters()}
     printing.print_catalogue(groups)
 
