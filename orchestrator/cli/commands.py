@@ -125,6 +125,21 @@ def validate(scenario: options.Scenario, robot: options.Robot = None, set_: opti
 
 
 @app.command()
+def limits(scenario: options.Scenario, robot: options.Robot = None, set_: options.Set = None) -> None:
+    """What a landing is judged by: each limit with its formula, numbers and source; nothing is run."""
+    with importing():
+        from orchestrator.api import load_scenario
+        from orchestrator.landing.limits import landing_only, limits_of, roll_range
+        from orchestrator.landing.resolve import resolve
+
+    landing = resolve(landing_only(load_scenario(scenario, set=set_, robot=robot)))
+    found = limits_of(landing)
+    printing.print_limits(found)
+    for line in roll_range(landing, found):
+        print(line)
+
+
+@app.command()
 def check(
     fmu: Annotated[Path, typer.Argument(metavar="FILE.fmu", help="The FMU.")],
     contract: Annotated[
@@ -231,6 +246,37 @@ def compare(
 
 
 app.command()(modes.modes)
+
+
+@app.command()
+def reproduce(
+    out: Annotated[Path, typer.Option(help="Folder of finished runs; none of them is made again.")] = Path(
+        "runs/reproduce"
+    ),
+    docs: Annotated[
+        Path | None, typer.Option(help="Folder of page, JSON and pictures. Default: docs; with --only that of --out.")
+    ] = None,
+    only: Annotated[
+        str | None, typer.Option(metavar="ID,ID,…", help="These claims alone, without the studies.")
+    ] = None,
+    study: Annotated[
+        Path | None, typer.Option(help="Folder with claims.toml and landings.toml. Default: the paper's.")
+    ] = None,
+    workers: Annotated[int | None, typer.Option(min=1, help="Processes. Default: one a processor.")] = None,
+    quiet: options.Quiet = False,
+) -> None:
+    """Hold the paper against our runs, claim by claim.
+
+    Writes reproduction.md and reproduction.json; an interrupted study goes on where it was.
+    """
+    with importing():
+        from orchestrator.studies.reproduce import reproduce as hold
+
+    with printing.counting_bar(quiet, "runs") as progress:
+        done = hold(study, out, docs, _items(only), workers, progress)
+    printing.print_reproduction(done)
+    print(f"page in {done.page}, {done.wall_s:.0f} s")
+    raise typer.Exit(done.exit_status)
 
 
 @app.command()
