@@ -10,15 +10,12 @@ The command line is a thin layer over it. Everything here can be had from `orche
 
 from __future__ import annotations
 
-import json
 import warnings
-from collections.abc import Callable, Iterator, Mapping, Sequence
+from collections.abc import Callable, Iterator, Sequence
 from contextlib import contextmanager
 from dataclasses import dataclass, replace
 from pathlib import Path
 from typing import Any
-
-import numpy as np
 
 from fmus.face.first_use import compile_modules
 from fmus.kernels.jit import COMPILATION
@@ -43,6 +40,7 @@ from orchestrator.runs.summary import result
 from orchestrator.runs.systems import System, resolve
 from orchestrator.scenario.layers import shared_options
 from orchestrator.scenario.read import load
+from orchestrator.scenario.settings import Set, texts
 from orchestrator.scenario.types import LandingScenario, Scenario, ScenarioNote
 
 __all__ = [
@@ -61,8 +59,6 @@ __all__ = [
 Progress = Callable[[str, float, float], None]
 """Told at every communication point what is being done, the time it has come to, and the time it ends at, s."""
 Out = Path | str | bool | None
-Set = Mapping[str, Any] | Sequence[str]
-"""Other values by their keys; or ``key=value`` in TOML, as on the command line."""
 
 
 class Unfinished(RunError):
@@ -195,7 +191,7 @@ class Changes:
         """Return the scenario with these changes."""
         if isinstance(scenario, Scenario):
             return self._on_loaded(scenario)
-        loaded = load(scenario, [*_texts(self._simulation), *_texts(self.set or {})], self.robot, self.master)
+        loaded = load(scenario, [*texts(self._simulation), *texts(self.set or {})], self.robot, self.master)
         for note in loaded.notes:
             warnings.warn(note, ScenarioNote, stacklevel=2)
         return loaded
@@ -292,23 +288,3 @@ def _draw(pictures: bool) -> Draw:
     from orchestrator.report.page import draw
 
     return draw
-
-
-def _texts(settings: Set) -> list[str]:
-    """Return `settings` as ``key=value`` in TOML."""
-    if not isinstance(settings, Mapping):
-        return list(settings)
-    return [f"{key}={_toml(value)}" for key, value in settings.items()]
-
-
-def _toml(value: Any) -> str:
-    """Return a value as TOML writes it; NumPy's numbers and arrays too."""
-    if isinstance(value, np.ndarray | np.generic):
-        return _toml(value.tolist())
-    if isinstance(value, bool):
-        return str(value).lower()
-    if isinstance(value, Mapping):
-        return "{ " + ", ".join(f"{json.dumps(str(key))} = {_toml(item)}" for key, item in value.items()) + " }"
-    if isinstance(value, list | tuple):
-        return f"[{', '.join(map(_toml, value))}]"
-    return repr(value) if isinstance(value, int | float) else json.dumps(str(value), ensure_ascii=False)

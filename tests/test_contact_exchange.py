@@ -131,10 +131,11 @@ def test_work_booked_is_the_work_of_the_law(seed):
 
 
 @pytest.mark.parametrize("friction", [0.0, 100.0, 0.1])
-def test_energy_balance_of_the_law_along_a_path(friction):
+@pytest.mark.parametrize("law", ["hunt_crossley", "impact"])
+def test_energy_balance_of_the_law_along_a_path(friction, law):
     """Work put in = rise of the elastic energy + dissipation; frictionless and sticking to the rule's
     accuracy, sliding to that of the rule at its kinks, which falls with the number of points."""
-    contact, h, errors = seated(3e-3, friction_coefficient=friction), 5e-3, []
+    contact, h, errors = seated(3e-3, friction_coefficient=friction, damping_law=law), 5e-3, []
     start, inputs = rigid_inputs(np.random.default_rng(3))
     for m in (8, 64):
         _, weights, motions, samples, lost, before = sampled(contact, start, inputs, h, m)
@@ -253,10 +254,14 @@ def fall(exchange_name, steps, settings, speed=0.3, time=0.04):
     return x, v, load, contact
 
 
+IMPACT = {"damping_law": "impact", "damping_coefficient": 1e4, "damping_depth": 0.02}
+
+
 @pytest.mark.parametrize(("name", "order"), [("waveform", 4.0), ("hermite", 4.0), ("point", 1.0)])
-def test_order_of_the_exchange(name, order):
+@pytest.mark.parametrize("law", [{}, IMPACT], ids=["hunt_crossley", "impact"])
+def test_order_of_the_exchange(name, order, law):
     """Nonlinear damped contact against a tight ODE solution of the same law."""
-    settings = {"friction_coefficient": 0.0}
+    settings = {"friction_coefficient": 0.0} | law
     base = 8 if order > 1 else 128
     runs = [fall(name, n, settings) for n in (base, 2 * base)]
     prm, out = runs[0][3]._prm, np.zeros(at.OUT_SIZE)

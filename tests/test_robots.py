@@ -44,7 +44,7 @@ def test_fptlir_by_hand():
     assert spec.parameters["inertia.zz"] == pytest.approx(8.5)
     assert spec.parameters["wheel[1].mount.z"] - 0.0532 == pytest.approx(0.162)
     assert spec.contact_parameters["groove_angle"] == pytest.approx(math.radians(100.0))
-    assert set(spec.assumptions()) == {"body.center_of_mass", "wheel[1].mount"}
+    assert set(spec.assumptions()) == {"body.center_of_mass", "wheel[1].mount", "rotors.max_thrust"}
 
 
 @pytest.mark.parametrize("mass", [10, 55, 100])

@@ -240,7 +240,15 @@ def flat(table: dict, prefix: str = "") -> dict:
 @pytest.mark.parametrize("path", sorted(FOLDER.glob("*.toml")), ids=lambda path: path.stem)
 def test_shipped_scenarios_say_what_they_always_said(path: Path):
     resolved = {key: value for key, value in flat(load(path).model_dump(exclude_none=True)).items() if value != []}
-    assert resolved == RESOLVED[path.stem]
+    assert resolved == RESOLVED[path.stem] | judged_by(path.stem)
+
+
+def judged_by(name: str) -> dict[str, float | bool]:
+    """Return the limits of a shipped scenario, which it has beside what it always said."""
+    if name.startswith("rig"):
+        return {"limits.z": False, "limits.rated_strength": 78110.0}
+    line = {"limits.conductor_spacing": 3.45, "limits.safe_clearance": 1.0, "limits.rated_strength": 98370.0}
+    return {} if name == "oscillator" else line
 
 
 def child(file: Path, text: str, name: str = "b.toml") -> Path:

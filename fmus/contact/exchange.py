@@ -135,7 +135,7 @@ def step(prm, method, inputs, t, h, nodes, weights, increments, state, path, mot
 
     Parameters
     ----------
-    prm : (15,); method : 0 point, 1 waveform, 2 hermite; inputs : (45,); t, h : s
+    prm : (18,); method : 0 point, 1 waveform, 2 hermite; inputs : (45,); t, h : s
     nodes, weights, increments : of `gauss_rule(m)`
     state : (43,), advanced; outputs : (42,), written
     path, motions, samples, grid : (2, 4, 15), (m + 3, 24), (m + 2, 34), (m + 5, 4) work space

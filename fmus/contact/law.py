@@ -16,6 +16,8 @@ from fmus.module.variables import VariableTable
 
 OPEN, STICK, SLIP, LEFT = 0, 1, 2, 3
 """Status of a contact; `LEFT`: the cable has left the groove."""
+HUNT_CROSSLEY, IMPACT = 0, 1
+"""What damps the walls: choices of the parameter `damping_law`."""
 OK, NO_TANGENT, NO_AXLE, NOT_FINITE, STEEP, TOO_FAR = range(6)
 """What the kernels return: done, or why the law cannot be evaluated. `STEEP`: the cable presses on a wall, and it is
 steeper to the wheel's plane than the wall is. `TOO_FAR`: a step takes the wheel farther than the groove is deep."""
@@ -25,7 +27,7 @@ NODES, WEIGHTS = np.polynomial.legendre.leggauss(9)
 
 
 def law_parameters(values: np.ndarray, table: VariableTable) -> np.ndarray:
-    """Return the law's parameters ``prm`` from a module's flat array of values: (15,) float64."""
+    """Return the law's parameters ``prm`` from a module's flat array of values: (18,) float64."""
     prm = np.zeros(at.PRM_SIZE)
     prm[: len(at.PARAMETERS)] = values[table.indices(at.PARAMETERS)]
     half = 0.5 * prm[at.GROOVE_ANGLE]
@@ -44,6 +46,29 @@ def _power(x, n):
     if n == 1.0:
         return x
     return x**n
+
+
+@kernel
+def step_up(x):
+    """Return the cubic of ADAMS' STEP function from 0 at x = 0 to 1 at x = 1, held beyond (x >= 0)."""
+    if x >= 1.0:
+        return 1.0
+    return x * x * (3.0 - 2.0 * x)
+
+
+@kernel
+def _pressed(share, elastic, delta, rate, prm):
+    """Return with what force a wall presses at a point, never pulling, from the `elastic` part of it.
+
+    Parameters
+    ----------
+    share : of the reference length, that the point stands for
+    delta, rate : m, m/s; penetration and its rate
+    """
+    if prm[at.DAMPING_LAW] == IMPACT:
+        ramp = step_up(delta / prm[at.DAMPING_DEPTH])
+        return max(elastic + share * prm[at.DAMPING_COEFFICIENT] * ramp * rate, 0.0)
+    return elastic * max(1.0 + prm[at.DAMPING] * rate, 0.0)
 
 
 @kernel
@@ -162,7 +187,7 @@ def walls(prm, motion, out):
 
     Parameters
     ----------
-    prm : (15,) of `law_parameters`
+    prm : (18,) of `law_parameters`
     motion : (24,) of cable point and wheel: places.py
     out : (34,) as `contact_wrench`; friction's places are zero
 
@@ -207,7 +232,7 @@ def walls(prm, motion, out):
     centre = -rr1 / rr2 if rr2 > 1e-18 else 0.0
     closest = math.sqrt(max(rr0 + rr1 * centre, 0.0))
 
-    k, n, damping = prm[at.STIFFNESS], prm[at.EXPONENT], prm[at.DAMPING]
+    k, n = prm[at.STIFFNESS], prm[at.EXPONENT]
     s, c, radius = prm[at.SINE], prm[at.COSINE], 0.5 * prm[at.CABLE_DIAMETER]
     rim = 0.5 * prm[at.GROOVE_WIDTH]
     outside = abs(y) > rim
@@ -238,8 +263,9 @@ def walls(prm, motion, out):
             if delta <= 0.0:
                 continue
             rate = side * c * (va0 + x * va1) - s * (vr0 + x * (vr1 + x * vr2)) / rho
-            elastic = WEIGHTS[i] * half / prm[at.REFERENCE_LENGTH] * k * _power(delta, n)
-            f = elastic * max(1.0 + damping * rate, 0.0)
+            share = WEIGHTS[i] * half / prm[at.REFERENCE_LENGTH]
+            elastic = share * k * _power(delta, n)
+            f = _pressed(share, elastic, delta, rate, prm)
             normal += f
             power += (f - elastic) * rate
             energy += elastic * delta / (n + 1.0)
@@ -333,7 +359,7 @@ def contact_wrench(prm, motion, slip, out):
 
     Parameters
     ----------
-    prm : (15,) of `law_parameters`
+    prm : (18,) of `law_parameters`
     motion : (24,) of cable point and wheel: places.py
     slip : (2,) m, trial elongation of the friction bristle along the cable and along the axle
     out : (34,) wrenches on cable and wheel, kinematics, powers and energies: places.py

@@ -39,7 +39,36 @@ _PARAMETERS = [
         POSITIVE,
     ),
     parameter("exponent", "1", 2.5, "exponent n of the penetration", _TOUCH),
-    parameter("damping", "s/m", 1.0, "Hunt-Crossley damping D, factor 1 + D * penetration rate", NON_NEGATIVE),
+    Variable(
+        "damping_law",
+        "parameter",
+        "1",
+        "hunt_crossley",
+        "what damps the walls: D times the elastic force, or the coefficient of ADAMS' IMPACT function",
+        kind="string",
+        choices=("hunt_crossley", "impact"),
+    ),
+    parameter(
+        "damping",
+        "s/m",
+        1.0,
+        "Hunt-Crossley damping D, factor 1 + D * penetration rate; of damping_law hunt_crossley alone",
+        NON_NEGATIVE,
+    ),
+    parameter(
+        "damping_coefficient",
+        "N.s/m",
+        1e4,
+        "full damping of a wall that is pressed over reference_length; of damping_law impact alone",
+        NON_NEGATIVE,
+    ),
+    parameter(
+        "damping_depth",
+        "m",
+        0.01,
+        "penetration at which damping_coefficient is full, reached by a cubic step; of damping_law impact alone",
+        POSITIVE,
+    ),
     parameter(
         "friction_coefficient",
         "1",
@@ -159,7 +188,7 @@ class Contact:
     """Contact of one grooved wheel with the cable; the equations stand in README.md of this folder."""
 
     NAME = "contact"
-    TITLE = "Hunt-Crossley contact of a grooved wheel with a cable"
+    TITLE = "contact of a grooved wheel with a cable"
     table = _table()
     _INPUTS = slice(table.index["cable.position.x"], table.index["cable.curvature.z"] + 1)
     _OUTPUTS = slice(table.index["cable.force.x"], table.index["touch_time"] + 1)

@@ -5,7 +5,7 @@ All places are the first of three components unless said otherwise. Vectors are 
 
 from __future__ import annotations
 
-# --- parameters of the law, ``prm`` (15,); the first twelve are parameters of the module, in this order
+# --- parameters of the law, ``prm`` (18,); the first fifteen are parameters of the module, in this order
 PARAMETERS = (
     "stiffness",
     "exponent",
@@ -19,6 +19,9 @@ PARAMETERS = (
     "max_contact_length",
     "tangential_stiffness",
     "tangential_damping",
+    "damping_law",
+    "damping_coefficient",
+    "damping_depth",
 )
 (
     STIFFNESS,
@@ -33,11 +36,14 @@ PARAMETERS = (
     MAX_LENGTH,
     TANGENTIAL_STIFFNESS,
     TANGENTIAL_DAMPING,
+    DAMPING_LAW,  # HUNT_CROSSLEY or IMPACT of law.py
+    DAMPING_COEFFICIENT,
+    DAMPING_DEPTH,
     SINE,  # of half the groove angle
     COSINE,
     APEX,  # radius of the groove's apex, m
-) = range(15)
-PRM_SIZE = 15
+) = range(18)
+PRM_SIZE = 18
 
 # --- motion (24,): the cable's part 0:12, the wheel's 12:24
 POINT = 0  # of the cable, at the contact's arc length, m

@@ -1,9 +1,10 @@
-"""What there is to choose from, with a line each: scenarios, robots, masters."""
+"""What there is to choose from, with a line each: scenarios, robots, contact stiffness sets, masters."""
 
 from __future__ import annotations
 
 from collections.abc import Callable
 
+from orchestrator.catalogue import contact_sets as sets
 from orchestrator.catalogue import robot_spec
 from orchestrator.catalogue import scenarios as shipped
 from orchestrator.catalogue.documents import chain
@@ -18,6 +19,11 @@ def scenarios() -> dict[str, str]:
 def robots() -> dict[str, str]:
     """Return the titles of the robots of the catalogue by name; what is wrong with a faulty one in its title's place."""
     return {name: _or_fault(lambda name=name: robot_spec.load_robot(name).title) for name in robot_spec.names()}
+
+
+def contact_sets() -> dict[str, str]:
+    """Return the titles of the contact's stiffness sets by name; what is wrong with a faulty one in its title's place."""
+    return {name: _or_fault(lambda name=name: sets.load_set(name).title) for name in sets.names()}
 
 
 def masters() -> dict[str, str]:

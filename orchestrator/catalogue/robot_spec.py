@@ -31,6 +31,8 @@ Moment = Annotated[Number, POSITIVE, in_unit("kg.m2")]
 Product = Annotated[Number, in_unit("kg.m2")]
 Length = Annotated[Number, POSITIVE, in_unit("m")]
 Angle = Annotated[Number, POSITIVE, in_unit("rad")]
+Force = Annotated[Number, POSITIVE, in_unit("N")]
+Time = Annotated[Number, POSITIVE, in_unit("s")]
 Position = Annotated[Triple, in_unit("m")]
 Direction = Annotated[Triple, in_unit("1")]
 
@@ -101,6 +103,34 @@ class Groove(Strict):
     groove_width: Length
 
 
+class Size(Strict):
+    """The robot as a box: D_Rx, D_Ry, D_Rz of Jia et al. 2025; `below_line`: how much of its height is below the line, if
+    not all of it."""
+
+    across: Length
+    along: Length
+    height: Length
+    below_line: Length | None = None
+
+
+class Rotors(Strict):
+    """The rotors: F_z,max, the largest thrust."""
+
+    max_thrust: Force
+
+
+class RobotLimits(Strict):
+    """The largest values that the maker calls safe, in the place of those that follow from the geometry."""
+
+    roll: Angle | None = None
+    yaw: Angle | None = None
+    pitch: Angle | None = None
+    z: Length | None = None
+    slip: Length | None = None
+    airborne: Time | None = None
+    wheel_force: Force | None = None
+
+
 class RobotSpec(Strict):
     """A robot.
 
@@ -115,6 +145,9 @@ class RobotSpec(Strict):
     notes: str = ""
     body: Body
     contact: Groove
+    size: Size | None = None
+    rotors: Rotors | None = None
+    limits: RobotLimits = RobotLimits()
     wheel: Annotated[list[Wheel], Field(min_length=1, max_length=4)]
     _path: Path = PrivateAttr(default=Path("robot.toml"))
 

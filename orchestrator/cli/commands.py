@@ -96,10 +96,11 @@ def build(
 
 @app.command("list")
 def list_() -> None:
-    """List scenarios, robots and masters."""
+    """List scenarios, robots, contact stiffness sets and masters."""
     from orchestrator.catalogue import listing
 
-    groups = {"Scenarios": listing.scenarios(), "Robots": listing.robots(), "Masters": listing.masters()}
+    groups = {"Scenarios": listing.scenarios(), "Robots": listing.robots()}
+    groups |= {"Contact stiffness sets": listing.contact_sets(), "Masters": listing.masters()}
     printing.print_catalogue(groups)
 
 
@@ -121,6 +122,21 @@ def validate(scenario: options.Scenario, robot: options.Robot = None, set_: opti
         print(f"{scenario}: valid; {len(graph.components)} FMUs, {len(list(graph.connections))} connections")
         for note in system.notes(graph):
             print(note)
+
+
+@app.command()
+def limits(scenario: options.Scenario, robot: options.Robot = None, set_: options.Set = None) -> None:
+    """What a landing is judged by: each limit with its formula, numbers and source; nothing is run."""
+    with importing():
+        from orchestrator.api import load_scenario
+        from orchestrator.landing.limits import landing_only, limits_of, roll_range
+        from orchestrator.landing.resolve import resolve
+
+    landing = resolve(landing_only(load_scenario(scenario, set=set_, robot=robot)))
+    found = limits_of(landing)
+    printing.print_limits(found)
+    for line in roll_range(landing, found):
+        print(line)
 
 
 @app.command()

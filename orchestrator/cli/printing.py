@@ -7,18 +7,22 @@ from collections.abc import Callable, Iterable, Iterator, Mapping, Sequence
 from contextlib import contextmanager
 from io import TextIOWrapper
 from math import isnan
-from typing import TYPE_CHECKING
+from typing import TYPE_CHECKING, Any
 
 import typer
 
 if TYPE_CHECKING:
     from orchestrator.landing.contract import Finding
+    from orchestrator.landing.limits import Limits
     from orchestrator.landing.modes import CableModes
     from orchestrator.runs.compare import Comparison
     from orchestrator.runs.errors import Parts
     from orchestrator.runs.result import Run
 
-COLOURS = {"ok": "green", "pass": "green", "missing": "red", "wrong": "red", "FAIL": "red", "advice": "yellow"}
+COLOURS = {
+    "ok": "green", "pass": "green", "missing": "red", "wrong": "red", "FAIL": "red", "advice": "yellow",
+    "EXCEEDED": "red", "NOT CLEAR": "red",
+}  # fmt: skip
 """First word of a verdict → its colour on a terminal."""
 
 
@@ -41,9 +45,38 @@ def print_run(run: Run) -> None:
     )
     for line in in_the_air(run.table):
         print(f"in the air: {line}")
+    print_safety(run.summary)
     _print_estimates(run)
     if run.energy is not None:
         print(f"energy drift: {run.energy.drift:.2g} J of {run.energy.exchanged:.3g} J exchanged")
+
+
+def print_safety(said: Mapping[str, Any]) -> None:
+    """Print each limit with its worst value and margin, the verdict, and what is not judged; `said` as ``summary.json``."""
+    from orchestrator.landing.safety import HEAD, rows, why_not_judged
+
+    if said.get("limits"):
+        print_table(HEAD, rows(said))
+    if said.get("safety"):
+        typer.secho(said["safety"], fg={True: "green", False: "red", None: "yellow"}[said["safe"]])
+        for line in why_not_judged(said):
+            print(f"not judged: {line}")
+
+
+def print_limits(limits: Limits) -> None:
+    """Print the limits of a landing: each with the formula that it follows from, its numbers, and its source."""
+    from orchestrator.landing.safety import readable
+
+    head = ("limit", "value", "unit", "formula", "source")
+    lines = []
+    for limit in limits.known.values():
+        value, unit = readable(limit.value, limit.unit)
+        formula = f"{limit.formula.text} = {limit.formula.filled}" if limit.formula is not None else "given"
+        formula = f"T_max / {limit.reference:.4g} N" if limit.name == "tension" else formula
+        lines.append((limit.name, f"{value:.4g}", unit, formula, limit.source))
+    print_table(head, lines)
+    for name, why in limits.missing.items():
+        print(f"not judged: {name} ({why})")
 
 
 def _print_estimates(run: Run) -> None:
@@ -88,9 +121,18 @@ def print_comparison(comparison: Comparison) -> None:
     print_table(("master", "H [s]", "iterations", "unconverged", "cable steps", "wall [s]"), _costs(comparison))
     print("error, by the signal's range; the coupling's includes that of the inner steps")
     print_table(("master", "H [s]", "signal", "coupling", "mesh", "whole", "allowed", "verdict"), _checks(comparison))
+    _print_safeties(comparison)
     for master, orders in comparison.observed_order.items():
         shown = ", ".join(f"{name} {orders[name]:.2f}" for name in comparison.tolerance if name in orders)
         print(f"observed order, {master}: {shown}")
+
+
+def _print_safeties(comparison: Comparison) -> None:
+    """Print whether the landing was safe by the reference, with its margins, and by each run."""
+    print_safety(comparison.reference.safety)
+    for run in comparison.results:
+        if run.safety:
+            print(f"{run.label}: {run.safety}")
 
 
 def _costs(comparison: Comparison) -> Iterator[tuple[str, ...]]:

@@ -79,7 +79,7 @@ def place(
         arms = np.array([rotate(q, *mount) for mount in mounts])
         return np.array([0.0, unknown[0], unknown[1]]) + arms
 
-    point = _point(cable, arc_length_at(cable, position))
+    point = point_at(cable, arc_length_at(cable, position))
     normal = np.array([-point[5], point[4]]) / np.hypot(*point[4:6])
     above = point[1:3] + distance * normal  # where the centre of a wheel over the landing point is
     if robot.n_wheels == 1:
@@ -145,7 +145,7 @@ def _wheels(
     q, wheels = np.zeros(4), []
     from_euler(angles[0], angles[1], angles[2], q)
     for k in range(robot.n_wheels):
-        point, axle = _point(cable, feet[k][0]), np.array(rotate(q, *_vector(robot, k, "axle_direction")))
+        point, axle = point_at(cable, feet[k][0]), np.array(rotate(q, *_vector(robot, k, "axle_direction")))
         wheels.append(Wheel(k + 1, point[:3], point[3:], centres[k], axle, contact))
     return wheels
 
@@ -162,7 +162,7 @@ def _require_span(cable: Cable, centres: np.ndarray, feet: Sequence[Foot]) -> No
             )
 
 
-def _point(cable: Cable, s: float) -> np.ndarray:
+def point_at(cable: Cable, s: float) -> np.ndarray:
     """Return position and tangent (6,) of the cable at arc length `s`."""
     out = np.zeros(6)
     interpolate(cable.model, cable.state[: cable.model.weight.size], s, np.zeros(8), out)
@@ -172,7 +172,7 @@ def _point(cable: Cable, s: float) -> np.ndarray:
 def arc_length_at(cable: Cable, y: float) -> float:
     """Return the unstretched arc length at the horizontal position `y` of the cable at rest."""
     length = float(cable.model.s[-1])
-    return root(lambda s: float(_point(cable, s)[1]) - y, 0.0, length, xtol=1e-12 * length)
+    return root(lambda s: float(point_at(cable, s)[1]) - y, 0.0, length, xtol=1e-12 * length)
 
 
 def _foot(cable: Cable, centre: np.ndarray) -> Foot:
@@ -183,12 +183,12 @@ def _foot(cable: Cable, centre: np.ndarray) -> Foot:
     s = arc_length_at(cable, float(np.clip(centre[1], 1e-6, cable["span"] - 1e-6)))
     length = float(cable.model.s[-1])
     for _ in range(20):
-        point = _point(cable, s)
+        point = point_at(cable, s)
         ds = float((centre[1:] - point[1:3]) @ point[4:6] / (point[4:6] @ point[4:6]))
         s = min(max(s + ds, 0.0), length)
         if abs(ds) < 1e-13 * length:
             break
-    point = _point(cable, s)
+    point = point_at(cable, s)
     apart = centre[1:] - point[1:3]
     side = np.sign(point[4] * apart[1] - point[5] * apart[0])
     return s, float(side * np.hypot(*apart)), float(point[1])

@@ -2,7 +2,7 @@
 
 from __future__ import annotations
 
-from collections.abc import Iterable, Iterator
+from collections.abc import Iterable, Iterator, Mapping
 from html import escape
 from math import isnan
 from pathlib import Path
@@ -10,7 +10,9 @@ from typing import Any
 
 from orchestrator.coupling.errors import InputError, OrchestratorError
 from orchestrator.coupling.run.results import Table, read_json, replacing
-from orchestrator.report.signals import extremes, flight, in_the_air, panels_for
+from orchestrator.landing.flight import flight
+from orchestrator.landing.safety import HEAD, rows, why_not_judged
+from orchestrator.report.signals import extremes, in_the_air, panels_for
 from orchestrator.runs.compare import Comparison
 from orchestrator.runs.errors import NAMES, Parts
 from orchestrator.runs.files import read_comparison, read_run, require_finished
@@ -80,6 +82,7 @@ def draw_run(directory: Path, run: Run, reference: Table | None = None) -> Itera
     yield _overview(folder, run, reference)
     plots.iterations(folder / "iterations.png", {legend(run): run.iterations})
     yield folder / "iterations.png"
+    yield from _limits(folder, run)
     yield from _shapes(folder, run)
     if run.energy is not None:
         plots.energy(folder / "energy.png", run.energy)
@@ -99,6 +102,7 @@ def draw_comparison(directory: Path, comparison: Comparison) -> Iterator[Path]:
     yield folder / "errors.png"
     plots.iterations(folder / "iterations.png", {legend(run): run.iterations for run in runs})
     yield folder / "iterations.png"
+    yield from _limits(folder, first)
     yield from _shapes(folder, first)
     if len({run.macro_step for run in comparison.runs}) > 1 and comparison.tolerance:
         accuracy.convergence(folder / "convergence.png", comparison)
@@ -120,6 +124,14 @@ def _panels(run: Run, reference: Table | None) -> list[Any]:
     """Return the panels of a run; with a reference those of signals that it has as well."""
     table = run.table if reference is None else {name: x for name, x in run.table.items() if name in reference}
     return panels_for(table, run.tolerances, run.summary["units"])
+
+
+def _limits(folder: Path, run: Run) -> Iterator[Path]:
+    from orchestrator.report.limits import limits
+
+    if run.limits:
+        limits(folder / "limits.png", run.limits, run.table, run.fields.get("tension"))
+        yield folder / "limits.png"
 
 
 def _shapes(folder: Path, run: Run) -> Iterator[Path]:
@@ -160,9 +172,13 @@ def _tables(results: Comparison | list[Run]) -> Iterator[list[tuple[str, ...]]]:
     """Yield the tables of a comparison or of runs, the head of each first."""
     if isinstance(results, Comparison):
         yield _comparison_rows(results)
+        yield from _safety_rows(results.reference.safety, "reference")
+        for run in results.results:
+            yield from _safety_rows(run.summary, run.label)
         return
     for run in results:
         yield _summary_rows(run)
+        yield from _safety_rows(run.summary)
         yield [
             ("signal", "unit", "start", "min", "max", "end"),
             *extremes(run.table, run.tolerances, run.summary["units"]),
@@ -184,15 +200,24 @@ def _comparison_rows(comparison: Comparison) -> list[tuple[str, ...]]:
     ]
 
 
+def _safety_rows(said: Mapping[str, Any], whose: str = "") -> Iterator[list[tuple[str, ...]]]:
+    """Yield the verdict on safety and its reasons, then the margins; nothing of a general graph."""
+    if said.get("safety"):
+        verdict = [("safety" + (f", {whose}" if whose else ""), said["safety"])]
+        yield [*verdict, *(("not judged", line) for line in why_not_judged(said))]
+    if said.get("limits"):
+        yield [HEAD, *rows(said)]
+
+
 def _summary_rows(run: Run) -> list[tuple[str, ...]]:
     summary = run.summary
     shown = ("robot", "stiffness_set", "master", "exchange", "macro_step", "simulated_s", "wall_s")
     shown += ("iterations_per_step", "unconverged_steps", "left_the_groove")
     energy = summary.get("energy") or {}
-    rows = [("energy " + name, str(energy[name])) for name in ("drift_J", "exchanged_J", "verdict") if name in energy]
-    rows += [(f"estimated error of {name}", _error_words(parts)) for name, parts in run.error_parts.items()]
-    rows += [("in the air", line) for line in in_the_air(run.table)]
-    return [("what", "value"), *((name, str(summary[name])) for name in shown if name in summary), *rows]
+    lines = [("energy " + name, str(energy[name])) for name in ("drift_J", "exchanged_J", "verdict") if name in energy]
+    lines += [(f"estimated error of {name}", _error_words(parts)) for name, parts in run.error_parts.items()]
+    lines += [("in the air", line) for line in in_the_air(run.table)]
+    return [("what", "value"), *((name, str(summary[name])) for name in shown if name in summary), *lines]
 
 
 def _error_words(parts: Parts) -> str:

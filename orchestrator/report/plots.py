@@ -15,7 +15,8 @@ from matplotlib.ticker import MaxNLocator
 from orchestrator.coupling.run.compare import matching_rows
 from orchestrator.coupling.run.results import Table
 from orchestrator.landing.audit import Audit
-from orchestrator.report.signals import Flight, Panel, shown
+from orchestrator.landing.flight import Flight
+from orchestrator.report.signals import Panel, shown
 from orchestrator.report.style import (
     BLACK,
     BLUE,

@@ -15,6 +15,7 @@ from types import MappingProxyType
 import numpy as np
 
 from orchestrator.coupling.run.results import Table
+from orchestrator.landing.flight import flight
 
 ROUND_OFF = 1e-12
 """Part of a signal's largest value that says nothing."""
@@ -171,62 +172,6 @@ def extremes(
 
 
 # -- in the air -----------------------------------------------------------------------------------------------
-
-
-@dataclass(frozen=True)
-class Flight:
-    """When wheels were off the cable after the first touch, to the macro step.
-
-    Attributes
-    ----------
-    time : (n,) s
-    wheels : contact → (n,) bool, whether it was open
-    airborne : (n,) bool, whether all were, since the first touch
-    """
-
-    time: np.ndarray
-    wheels: Mapping[str, np.ndarray]
-    airborne: np.ndarray
-
-    @property
-    def total(self) -> float:
-        """Time without any contact, s."""
-        return _duration(self.time, self.airborne)
-
-    @property
-    def spans(self) -> list[tuple[float, float]]:
-        """Start and end (s) of each span without any contact; it begins and ends in the middle of a macro step."""
-        edges = np.diff(np.concatenate([[False], self.airborne, [False]]).astype(int))
-        middle = np.concatenate([self.time[:1], 0.5 * (self.time[1:] + self.time[:-1]), self.time[-1:]])
-        return list(zip(middle[edges == 1].tolist(), middle[edges == -1].tolist(), strict=True))
-
-    @property
-    def of_wheels(self) -> dict[str, float]:
-        """Time of each wheel without contact since it first touched, s."""
-        return {name: _duration(self.time, _since_touch(is_open)) for name, is_open in self.wheels.items()}
-
-
-CLOSED = (1.0, 2.0)
-"""Values of a contact's ``status``: sticking, slipping. Open is 0, and 3 a cable that has left the groove."""
-
-
-def flight(table: Table) -> Flight | None:
-    """Return when the robot of a landing was in the air; None where it has no contacts, or has not touched."""
-    names = [m[1] for name in table if (m := re.fullmatch(r"(contact\d+)\.status", name))]
-    wheels = {name: ~np.isin(table[f"{name}.status"], CLOSED) for name in names}
-    if not wheels or all(is_open.all() for is_open in wheels.values()):
-        return None
-    return Flight(table["time"], wheels, _since_touch(np.all(list(wheels.values()), axis=0)))
-
-
-def _since_touch(is_open: np.ndarray) -> np.ndarray:
-    """Return `is_open` (n,) with False before the first touch."""
-    return is_open & (np.cumsum(~is_open) > 0)
-
-
-def _duration(time: np.ndarray, flags: np.ndarray) -> float:
-    """Return for how long `flags` (n,) hold; a macro step in which they change counts half."""
-    return float(np.diff(time) @ (0.5 * (flags[1:].astype(float) + flags[:-1])))
 
 
 def in_the_air(table: Table) -> Iterator[str]:

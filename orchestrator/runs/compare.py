@@ -9,6 +9,7 @@ from typing import Any
 
 import numpy as np
 
+from orchestrator.coupling.errors import MISSED
 from orchestrator.coupling.run.compare import (
     SignalError,
     observed_order,
@@ -20,6 +21,8 @@ from orchestrator.landing.intervals import coarsened
 from orchestrator.runs.errors import CONSTANT, Parts, differences, judged, left_out
 from orchestrator.runs.result import EXIT_STATUS, Run, Verdict, pandas_module, run_label
 
+SAFETY = ("safe", "safety", "limits", "not_judged")
+"""Keys of what is said of the safety of a landing."""
 REFERENCE_MARGIN = 0.1
 """The reference's own error may be this part of a tolerance, or the verdict means nothing."""
 
@@ -36,6 +39,7 @@ class Reference:
     estimated_error : its own error by signal, in the signal's unit; of the signals judged with what the finer mesh leaves
     fields : arrays over time, as in ``fields.h5``
     finer : the signals on a mesh `mesh_ratio` times as fine as the runs'; None where no mesh is judged
+    safety : what it says of the safety of a landing, as ``summary.json`` of a run; empty of a general graph
     """
 
     kind: str
@@ -45,6 +49,12 @@ class Reference:
     fields: dict[str, np.ndarray] = field(default_factory=dict)
     finer: Table | None = None
     mesh_ratio: float = float("nan")
+    safety: Mapping[str, Any] = field(default_factory=dict)
+
+    @property
+    def safe(self) -> bool | None:
+        """Whether the landing is safe by the reference; None where nothing is judged."""
+        return self.safety.get("safe")
 
     def parts(self, table: Table, names: Iterable[str]) -> dict[str, Parts]:
         """Return the errors of a run's signals by their parts; that of the inner steps is in that of the coupling."""
@@ -144,8 +154,15 @@ class Comparison:
 
     @property
     def exit_status(self) -> int:
-        """The exit status of ``orchestrator compare``: 0 within, 1 missed, 3 failed, 130 interrupted."""
-        return EXIT_STATUS[self.verdict]
+        """The exit status of ``orchestrator compare``: 0 within and not unsafe, 1 missed or not safe, 3 failed, 130
+        interrupted."""
+        return MISSED if self.verdict == "within" and self.safe is False else EXIT_STATUS[self.verdict]
+
+    @property
+    def safe(self) -> bool | None:
+        """Whether every run and the reference say that the landing is safe; None where nothing is judged."""
+        found = [self.reference.safe, *(run.safe for run in self.results)]
+        return False if False in found else None if None in found else True
 
     @property
     def observed_order(self) -> dict[str, dict[str, float]]:
@@ -164,6 +181,7 @@ class Comparison:
                 "kind": reference.kind,
                 "wall_s": reference.wall_s,
                 "estimated_error": reference.estimated_error,
+                **reference.safety,
             },
             "runs": self.runs,
             "observed_order": self.observed_order,
@@ -189,6 +207,7 @@ class Comparison:
         """Return the comparison that ``comparison.json`` and ``reference.csv`` hold."""
         known = content["reference"]
         reference = Reference(known["kind"], table, known["wall_s"], _numbers(known["estimated_error"], "nan"))
+        reference.safety = {key: known[key] for key in SAFETY if key in known}
         return cls(reference, [_run_errors(run) for run in content["runs"]], content["tolerance"])
 
 

@@ -19,13 +19,12 @@ from orchestrator.coupling.run.log import Log
 from orchestrator.coupling.run.results import Table
 from orchestrator.coupling.run.simulate import simulate
 from orchestrator.landing import audit
+from orchestrator.landing.flight import left_the_groove
 from orchestrator.runs.components import master_of, opened, recorded
 from orchestrator.runs.errors import Parts, judged, missed
 from orchestrator.runs.systems import System, resolve
 from orchestrator.scenario.types import Scenario
 
-LEFT_THE_GROOVE = 3
-"""Value of a contact's `status` when the cable has left the groove."""
 OF_A_STEP = (
     "time", "iterations", "residual", "subdivisions", "rejected", "columns", "converged", "estimate", "power_residual",
 )  # fmt: skip
@@ -101,11 +100,7 @@ class Coupled:
     @property
     def fallen(self) -> list[str]:
         """The contacts that the cable has left."""
-        return [
-            name.removesuffix(".status")
-            for name, values in self.table.items()
-            if name.startswith("contact") and name.endswith(".status") and np.any(values == LEFT_THE_GROOVE)
-        ]
+        return left_the_groove(self.table)
 
 
 def run_coupled(system: System | Scenario, progress: Reached = lambda _: None) -> Coupled:

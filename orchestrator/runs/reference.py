@@ -2,10 +2,11 @@
 
 from __future__ import annotations
 
-from collections.abc import Callable, Iterable
+from collections.abc import Callable, Iterable, Mapping
 from fractions import Fraction
 from functools import reduce
 from math import gcd
+from typing import Any
 
 import numpy as np
 
@@ -14,6 +15,7 @@ from orchestrator.coupling.errors import RunError
 from orchestrator.coupling.masters import MASTERS
 from orchestrator.coupling.masters.options import master_options
 from orchestrator.coupling.run.compare import communication_times, largest_difference
+from orchestrator.coupling.run.results import Table, plain
 from orchestrator.landing import monolithic
 from orchestrator.landing.monolithic import Problem
 from orchestrator.runs.compare import Reference
@@ -59,12 +61,20 @@ def _monolithic_reference(
     estimates = {name: solution.estimated_error[name] for name in table if name != "time"}
     finer = system.meshed(FINER_MESH)
     if finer is None:
-        return Reference("monolithic", table, solution.wall_s, estimates, fields)
+        said = _safety(system, table, fields, estimates)
+        return Reference("monolithic", table, solution.wall_s, estimates, fields, safety=said)
     on_finer = solved(finer.system, times, progress, ON_FINER_MESH)
     by = left_out(finer.ratio) - 1.0  # what is left of the error of a mesh on the finer one, by their difference
     for name, value in differences(table, on_finer, judged(table, system.scenario.simulation.tolerances)).items():
         estimates[name] += by * value
-    return Reference("monolithic", table, solution.wall_s, estimates, fields, on_finer, finer.ratio)
+    said = _safety(system, table, fields, estimates)
+    return Reference("monolithic", table, solution.wall_s, estimates, fields, on_finer, finer.ratio, said)
+
+
+def _safety(system: System, table: Table, fields: dict[str, np.ndarray], errors: Mapping[str, float]) -> dict[str, Any]:
+    """Return what is to be said of the safety of a landing; nothing of a general graph."""
+    found = system.safety(table, fields, errors)
+    return plain(found.content()) if found is not None else {}
 
 
 def _fine_reference(system: System, macro_steps: list[float], progress: Reached) -> Reference:
@@ -82,7 +92,9 @@ def _fine_reference(system: System, macro_steps: list[float], progress: Reached)
         except RunError as error:
             raise _without_reference(system, error) from None
     kind = f"coupled, {fine.master}, macro step {fine.log.macro_step:g} s"
-    return Reference(kind, fine.table, fine.log.wall, dict(largest_difference(coarse.table, fine.table)))
+    errors = dict(largest_difference(coarse.table, fine.table))
+    said = _safety(system, fine.table, fine.fields, errors)
+    return Reference(kind, fine.table, fine.log.wall, errors, safety=said)
 
 
 def _without_reference(system: System, error: RunError) -> RunError:

@@ -14,6 +14,7 @@ import numpy as np
 from orchestrator.coupling.errors import DONE, FAILED, FORWARD, INTERRUPTED, MISSED
 from orchestrator.coupling.run.results import Table
 from orchestrator.landing import audit
+from orchestrator.landing.safety import Judged
 from orchestrator.runs.errors import CURES, NAMES, Parts, missed
 
 Verdict = Literal["within", "missed", "failed", "interrupted"]
@@ -142,18 +143,37 @@ class Run:
 
     @property
     def verdict(self) -> Verdict:
-        """How the run ended, as the exit status of ``orchestrator run`` says it.
+        """How the run ended, and whether its numbers are good.
 
         ``within``: every macro step converged, the robot is on the cable, and no estimated error is larger than its
         tolerance; ``missed``: not so; ``failed``, ``interrupted``: the results end before the stop time. A run without an
-        estimate (`estimated_error` empty or NaN) is judged by the rest alone.
+        estimate (`estimated_error` empty or NaN) is judged by the rest alone. Whether the landing was safe is another
+        question: `safe`.
         """
         return self.summary["verdict"]
 
     @property
     def exit_status(self) -> int:
-        """The exit status of ``orchestrator run``: 0 within, 1 missed, 3 failed, 130 interrupted."""
-        return EXIT_STATUS[self.verdict]
+        """The exit status of ``orchestrator run``: 0 within and not unsafe, 1 missed or not safe, 3 failed, 130 interrupted."""
+        return MISSED if self.verdict == "within" and self.safe is False else EXIT_STATUS[self.verdict]
+
+    @property
+    def safe(self) -> bool | None:
+        """Whether the landing clearly keeps every limit that was judged, on the line, up to the end of the run.
+
+        None where nothing is judged: a general graph, no limit known, no wheel that has touched. `safety` says it in words.
+        """
+        return self.summary.get("safe")
+
+    @property
+    def safety(self) -> str:
+        """The verdict on safety in a line: what it covers, up to when; empty of a general graph."""
+        return self.summary.get("safety", "")
+
+    @cached_property
+    def limits(self) -> Mapping[str, Judged]:
+        """The limits that were judged, by name: each with the worst value, the margin, when, and at which wheel."""
+        return {name: Judged.from_content(content) for name, content in self.summary.get("limits", {}).items()}
 
     @property
     def notes(self) -> list[str]:
@@ -181,6 +201,7 @@ class Run:
         lines += self.summary["warnings"]
         lines += [self._missed(name) for name in missed(self.error_parts, self.tolerances, self.table)]
         lines += [f"{self.error}; the results up to there are kept"] if self.error else []
+        lines += [self.safety] if self.safe is False else []
         return lines + ([f"no pictures: {self.manifest['pictures']}"] if self.manifest.get("pictures") else [])
 
     def _missed(self, name: str) -> str:

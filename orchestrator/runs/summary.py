@@ -15,6 +15,8 @@ from orchestrator.runs.coupled import Coupled
 from orchestrator.runs.result import Run, Verdict
 from orchestrator.scenario.types import Scenario
 
+NO_LANDING: Mapping[str, Any] = {"safe": None, "safety": "", "limits": {}, "not_judged": {}}
+
 
 def result(coupled: Coupled) -> Run:
     """Return the result of a coupled run, not yet written."""
@@ -41,6 +43,7 @@ def summary(coupled: Coupled) -> dict[str, Any]:
         "scenario": scenario.name,
         "title": scenario.title,
         "verdict": verdict(coupled),
+        **safety(coupled),
         "notes": scenario.notes,
         "warnings": coupled.system.warnings(coupled.table),
         "wiring": coupled.notes,
@@ -70,6 +73,14 @@ def verdict(coupled: Coupled) -> Verdict:
     if coupled.log.error is not None:
         return "interrupted" if isinstance(coupled.log.error, Interruption) else "failed"
     return "missed" if coupled.log.unconverged or coupled.fallen or coupled.misses else "within"
+
+
+def safety(coupled: Coupled) -> dict[str, Any]:
+    """Return what is said of the safety of a landing; of a general graph, that nothing is."""
+    error = coupled.log.error
+    errors = coupled.estimated_error | {f"{i['contact']}.normal_force_max": np.inf for i in unresolved(coupled)}
+    found = coupled.system.safety(coupled.table, coupled.fields, errors, None if error is None else str(error))
+    return found.content() if found is not None else NO_LANDING
 
 
 def _cost(coupled: Coupled) -> dict[str, Any]:

@@ -4,6 +4,7 @@ from __future__ import annotations
 
 from collections.abc import Callable, Iterable, Mapping, Sequence
 from dataclasses import dataclass, replace
+from functools import cached_property
 from pathlib import Path
 from typing import TYPE_CHECKING, Any, Protocol, TypeVar
 
@@ -34,8 +35,10 @@ from orchestrator.landing.build import has_monolithic, problem
 from orchestrator.landing.contract import is_control, is_unused
 from orchestrator.landing.fields import cable_fields
 from orchestrator.landing.impacts import Impact, impacts
+from orchestrator.landing.limits import Limits, limits_of
 from orchestrator.landing.resolve import MESH_KEYS, MESH_TOLERANCE, Landing, Variables
 from orchestrator.landing.resolve import resolve as resolve_landing
+from orchestrator.landing.safety import Safety, judge
 from orchestrator.landing.wiring import inner_step, lacking, landing_graph
 from orchestrator.scenario.types import CableSection, Component, GraphScenario, LandingScenario, RobotSection, Scenario
 
@@ -104,6 +107,16 @@ class System(Protocol):
 
     def impacts(self, table: Table) -> list[Impact]:
         """Return the impacts of wheels on a cable, and how long each lasts."""
+        ...
+
+    def safety(
+        self,
+        table: Table,
+        fields: Mapping[str, np.ndarray],
+        errors: Mapping[str, float] | None = None,
+        fault: str | None = None,
+    ) -> Safety | None:
+        """Return whether a landing was safe, parameters as for `judge`; None of what is no landing."""
         ...
 
     def changed(self, options: Mapping[str, Any], **simulation: Any) -> System:
@@ -176,6 +189,21 @@ class LandingSystem:
     def impacts(self, table: Table) -> list[Impact]:
         """Return the impacts of the wheels, and how long each lasts."""
         return impacts(self.landing, table)
+
+    @cached_property
+    def limits(self) -> Limits:
+        """What the landing is judged by."""
+        return limits_of(self.landing)
+
+    def safety(
+        self,
+        table: Table,
+        fields: Mapping[str, np.ndarray],
+        errors: Mapping[str, float] | None = None,
+        fault: str | None = None,
+    ) -> Safety:
+        """Return the signals held against the limits; parameters as for `judge`."""
+        return judge(self.limits, table, fields.get("tension"), errors, fault)
 
     def changed(self, options: Mapping[str, Any], **simulation: Any) -> LandingSystem:
         """Return it with other options of the master and other simulation settings; the start stays as it is."""
@@ -269,6 +297,15 @@ class GraphSystem:
     def impacts(self, table: Table) -> list[Impact]:
         """Return nothing: a general graph has no wheels."""
         return []
+
+    def safety(
+        self,
+        table: Table,
+        fields: Mapping[str, np.ndarray],
+        errors: Mapping[str, float] | None = None,
+        fault: str | None = None,
+    ) -> None:
+        """Return None: a general graph is no landing."""
 
     def changed(self, options: Mapping[str, Any], **simulation: Any) -> GraphSystem:
         """Return it with other options of the master and other simulation settings."""

@@ -21,6 +21,7 @@ from orchestrator.scenario.types import DEFAULT_MASTER, UNITS, Provenance
 Known = Mapping[str, Mapping[str, Variable]]
 """Section → its variables by name."""
 LARGEST = sys.float_info.max
+SPACING = ("conductor_spacing", "safe_clearance")
 GROUPS = {"parameters": "parameter", "inputs": "input"}
 """Table of a section → causality of the variables that it sets."""
 
@@ -105,6 +106,7 @@ def check(document: Document, known: Known) -> Iterator[Complaint]:
     yield from _master_problems(document)
     yield from _step_problems(document)
     yield from _position_problems(document, known)
+    yield from _limit_problems(document)
 
 
 def _section_problems(path: str, section: Document, known: Mapping[str, Variable]) -> Iterator[Complaint]:
@@ -182,6 +184,18 @@ def _position_problems(document: Document, known: Known) -> Iterator[Complaint]:
         span = known["cable"]["span"].start
     if _is_number(position) and _is_number(span) and 0 < span < float("inf") and not 0 < position < span:
         yield Complaint("landing.position", f"{position:g} m is off the span; it must lie within 0 … {span:g} m")
+
+
+def _limit_problems(document: Document) -> Iterator[Complaint]:
+    """Yield limits that lack what they are counted by."""
+    limits, conductor = _table(document, "limits"), _table(document, "cable").get("conductor")
+    if _is_number(limits.get("tension")) and conductor is None and "rated_strength" not in limits:
+        yield Complaint(
+            "limits.tension", "is a share of the rated tensile strength; give limits.rated_strength as well"
+        )
+    for here, there in (SPACING, SPACING[::-1]):
+        if here in limits and there not in limits:
+            yield Complaint(f"limits.{here}", f"says nothing without limits.{there}; give both")
 
 
 def _table(document: Document, key: str) -> Document:

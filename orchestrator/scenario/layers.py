@@ -13,6 +13,7 @@ from orchestrator.catalogue.documents import Document, Stack, chain, is_quantity
 from orchestrator.catalogue.scenarios import find
 from orchestrator.coupling.errors import InputError
 from orchestrator.coupling.masters.options import master_options
+from orchestrator.scenario import contact_set
 from orchestrator.scenario.types import DEFAULT_MASTER
 
 NAMED_TABLES = ("parameters", "inputs", "tolerances")
@@ -46,6 +47,7 @@ def lay(stack: Stack, above: Document, place: str) -> list[str]:
     master = bare(simulation.get("master")) if isinstance(simulation, dict) else None
     if isinstance(master, str):
         _make_room_for_master(stack.document, master)
+    notes += contact_set.make_room(stack.document, above)
     stack.put(above, place)
     return notes
 
@@ -157,8 +159,9 @@ def replace_master(stack: Stack, master: str) -> None:
     lay(stack, {"simulation": {"master": master}}, "--master")
 
 
-def override(stack: Stack, texts: Iterable[str]) -> None:
-    """Write each ``key=value`` into the document."""
+def override(stack: Stack, texts: Iterable[str]) -> list[str]:
+    """Write each ``key=value`` into the document; return what is to be said of it."""
+    notes: list[str] = []
     for text in texts:
         path, equals, value = (part.strip() for part in text.partition("="))
         if not (path and equals and value):
@@ -170,8 +173,11 @@ def override(stack: Stack, texts: Iterable[str]) -> None:
             if not isinstance(table, dict):
                 raise InputError(f"{SET} {text}: {key} is a value and has no keys below it")
         given = named_tables({last: _toml_value(value, text)})
+        if path == contact_set.PLACE:
+            notes += contact_set.make_room(stack.document, {"contact": given})
         table |= given
         stack.note(SET, [path, *leaves(given, "".join(f"{key}." for key in tables))])
+    return notes
 
 
 def _keys(path: str) -> list[str]:

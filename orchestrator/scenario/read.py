@@ -16,6 +16,7 @@ from orchestrator.catalogue.scenarios import find
 from orchestrator.coupling.errors import InputError
 from orchestrator.scenario import layers
 from orchestrator.scenario.check import check, known_variables, to_si
+from orchestrator.scenario.contact_set import fill_in
 from orchestrator.scenario.inertia import scale_inertia
 from orchestrator.scenario.types import GraphScenario, LandingScenario, Provenance, Scenario
 
@@ -44,8 +45,8 @@ def load(
         notes += layers.replace_robot(stack, robot)
     if master is not None:
         layers.replace_master(stack, master)
-    layers.override(stack, overrides)
-    problems: list[Complaint] = []
+    notes += layers.override(stack, overrides)
+    problems: list[Complaint] = fill_in(stack)
     provenance: dict[str, Provenance] = {}
     plain = _unwrap(stack, stack.document, "", provenance, problems)
     layers.resolve_paths(plain, path.parent)

@@ -105,9 +105,13 @@ class RobotSection(Section):
 
 
 class ContactSection(Section):
-    """The wheel contact; one instance a wheel is made from it."""
+    """The wheel contact; one instance a wheel is made from it.
+
+    `stiffness_set` : a set of the catalogue; its parameters are those that the scenario does not give itself
+    """
 
     fmu: str | None = None
+    stiffness_set: str | None = None
     parameters: Settings = {}
 
 
@@ -124,6 +128,53 @@ class LandingSection(Section):
     position: Annotated[float, In("m")]
     height: Annotated[NonNegative, In("m")] = 0.0
     velocity: Annotated[NonNegative, In("m/s")] = 0.0
+
+
+def _bound(value: Any) -> float | Literal[False] | None:
+    if value is None or value is False:
+        return value
+    number = isinstance(value, int | float) and not isinstance(value, bool)
+    if not (number and 0.0 <= value < float("inf")):
+        raise ValueError("must be a finite number, not negative; or false, which switches the limit off")
+    return float(value)
+
+
+def _angle(value: Any) -> float | Literal[False] | None:
+    bound = _bound(value)
+    if bound and bound > MOST_ANGLE:
+        raise ValueError('is more than half a turn: rad unless a unit is given; write { value = 20.0, unit = "deg" }')
+    return bound
+
+
+MOST_ANGLE = 3.15
+"""rad."""
+Bound = Annotated[Any, AfterValidator(_bound)]
+"""The largest value that is safe; None: by the robot's file or its geometry; False: not judged."""
+AngleBound = Annotated[Any, AfterValidator(_angle)]
+
+
+class LimitsSection(Section):
+    """What is safe (docs/concepts/limits.md), and what of the line the formulas need.
+
+    Attributes
+    ----------
+    roll, yaw, pitch, z, slip, airborne, tension, wheel_force : the limits; `tension` as a share of `rated_strength`
+    conductor_spacing : D_12, from this line to the one below it
+    safe_clearance : D_E, that must stay between robot and the line below
+    rated_strength : rated tensile strength of the conductor
+    """
+
+    roll: Annotated[AngleBound, In("rad")] = None
+    yaw: Annotated[AngleBound, In("rad")] = None
+    pitch: Annotated[AngleBound, In("rad")] = None
+    z: Annotated[Bound, In("m")] = None
+    slip: Annotated[Bound, In("m")] = None
+    airborne: Annotated[Bound, In("s")] = None
+    tension: Annotated[Bound, In("1")] = None
+    wheel_force: Annotated[Bound, In("N")] = None
+    conductor_spacing: Annotated[Positive | None, In("m")] = None
+    safe_clearance: Annotated[Positive | None, In("m")] = None
+    rated_strength: Annotated[Positive | None, In("N")] = None
 
 
 class Component(Section):
@@ -213,6 +264,7 @@ class LandingScenario(_Common):
     robot: RobotSection
     contact: ContactSection = ContactSection()
     landing: LandingSection
+    limits: LimitsSection = LimitsSection()
 
 
 class GraphScenario(_Common):
@@ -228,7 +280,7 @@ Scenario = LandingScenario | GraphScenario
 
 UNITS = {
     f"{section}.{name}": marker.unit
-    for section, model in (("simulation", Simulation), ("landing", LandingSection))
+    for section, model in (("simulation", Simulation), ("landing", LandingSection), ("limits", LimitsSection))
     for name, field in model.model_fields.items()
     for marker in field.metadata
     if isinstance(marker, In)

@@ -1,0 +1,1 @@
+"""Studies: many landings held against what a paper or a measurement says."""

@@ -36,7 +36,7 @@ class System(NamedTuple):
     Attributes
     ----------
     robot : (56,) of `fmus.robot.rigid_body`
-    contacts : (n_wheels, 15) of `fmus.contact.law`
+    contacts : (n_wheels, 18) of `fmus.contact.law`
     control : (4 + 7 n_wheels,) thrust, torque and drive torques in the places of `rigid_body.resultants`
     """
 

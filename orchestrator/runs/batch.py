@@ -1,0 +1,147 @@
+"""Many runs in worker processes: resumable, each made once, and none the victim of another.
+
+A run that crashes its process or hangs costs itself alone. At every moment the store holds whole runs only, so that a
+batch that was interrupted goes on where it was.
+"""
+
+from __future__ import annotations
+
+import os
+from collections.abc import Callable, Iterator, Sequence
+from concurrent.futures import TimeoutError as RanTooLong
+from concurrent.futures import as_completed
+from contextlib import contextmanager
+from multiprocessing import get_context
+from pathlib import Path
+
+from pebble import ProcessExpired, ProcessFuture, ProcessPool
+
+from fmus.face.first_use import compile_modules
+from fmus.kernels.jit import is_compiled
+from orchestrator.coupling.errors import InputError
+from orchestrator.runs.job import Done, Job, found, make
+
+Counted = Callable[[int, int], None]
+"""Told how many runs are done, and of how many."""
+ONE_THREAD = ("OPENBLAS_NUM_THREADS", "OMP_NUM_THREADS", "MKL_NUM_THREADS", "VECLIB_MAXIMUM_THREADS")
+COMPILED = {"monolithic": "orchestrator.landing.monolithic", "coupled": "fmus.cable"}
+"""The package whose kernels each solver needs last."""
+
+
+def run_batch(
+    jobs: Sequence[Job],
+    store: Path,
+    workers: int | None = None,
+    timeout: float | None = None,
+    progress: Counted = lambda done, of: None,
+) -> list[Done]:
+    """Make those of `jobs` that `store` has not, and return all in their order.
+
+    Parameters
+    ----------
+    jobs : equal ones are run once
+    store : folder of finished runs
+    workers : processes; None: as many as there are processors
+    timeout : s that one run may take; one that takes longer is ended
+    progress : called as runs are finished, those found first
+
+    Raises
+    ------
+    InputError : jobs that cannot be read, all of them at once, before anything is run
+    """
+    keys = _keys(jobs)
+    unique = dict(zip(keys, jobs, strict=True))
+    ready = {key: done for key, job in unique.items() if (done := found(job, store)) is not None}
+    progress(len(ready), len(unique))
+    left = {key: job for key, job in unique.items() if key not in ready}
+    if left:
+        store.mkdir(parents=True, exist_ok=True)
+        for key, done in _made(left, store, workers or _processors(), timeout):
+            ready[key] = done
+            progress(len(ready), len(unique))
+    return [Done(job, ready[key].directory, ready[key].failure) for key, job in zip(keys, jobs, strict=True)]
+
+
+def _keys(jobs: Sequence[Job]) -> list[str]:
+    """Return the keys of `jobs`; `InputError` with what is wrong with any of them."""
+    keys, problems = [], list[str]()
+    for job in jobs:
+        try:
+            keys.append(job.key)
+        except InputError as error:
+            problems += error.problems
+    if problems:
+        raise InputError(dict.fromkeys(problems))
+    return keys
+
+
+def _processors() -> int:
+    count = getattr(os, "sched_getaffinity", None)
+    return len(count(0)) if count else os.cpu_count() or 1
+
+
+def _made(left: dict[str, Job], store: Path, workers: int, timeout: float | None) -> Iterator[tuple[str, Done]]:
+    """Yield each run of `left` as it is finished."""
+    compile_modules()
+    with _pool(min(workers, len(left))) as pool:
+        alone = _first_of_its_kind(left)
+        for keys, limit in ((alone, None), ([key for key in left if key not in alone], timeout)):
+            futures = {pool.schedule(make, args=(left[key], store), timeout=limit): key for key in keys}
+            for future in as_completed(futures):
+                key = futures[future]
+                yield key, _ended(left[key], store, future)
+
+
+def _first_of_its_kind(left: dict[str, Job]) -> list[str]:
+    """Return the runs that go first, alone and without a time limit: they compile the kernels that the others load."""
+    kinds = {job.solver: key for key, job in reversed(left.items())}
+    return [key for solver, key in kinds.items() if not is_compiled(COMPILED[solver])]
+
+
+@contextmanager
+def _pool(workers: int) -> Iterator[ProcessPool]:
+    """Give worker processes with one BLAS thread each; what still runs at an interruption is ended."""
+    with _one_thread():
+        pool = ProcessPool(workers, initializer=_begin, context=get_context("spawn"))  # type: ignore[arg-type]
+        try:
+            yield pool
+            pool.close()
+        except BaseException:
+            pool.stop()
+            raise
+        finally:
+            pool.join()
+
+
+@contextmanager
+def _one_thread() -> Iterator[None]:
+    """Let the processes started within have one thread each: a library reads that as it is loaded."""
+    before = {name: os.environ.get(name) for name in ONE_THREAD}
+    os.environ.update(dict.fromkeys(ONE_THREAD, "1"))
+    try:
+        yield
+    finally:
+        for name, value in before.items():
+            os.environ.pop(name) if value is None else os.environ.update({name: value})
+
+
+def _begin() -> None:
+    """Leave Ctrl-C to the process that has started this one, and say nothing on its terminal."""
+    import signal
+
+    from fmus.kernels import notice
+
+    signal.signal(signal.SIGINT, signal.SIG_IGN)
+    notice.muted = True
+
+
+def _ended(job: Job, store: Path, future: ProcessFuture) -> Done:
+    """Return how a run has ended; one that left nothing will be tried again by the next batch."""
+    try:
+        future.result()
+    except RanTooLong:
+        return Done(job, None, "took longer than it may, and was ended; give it more time (timeout)")
+    except ProcessExpired as error:
+        return Done(job, None, f"its process died (exit code {error.exitcode}); run the scenario alone to see why")
+    done = found(job, store)
+    return done if done is not None else Done(job, None, "left no results; is the disk full?")

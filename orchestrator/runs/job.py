@@ -1,0 +1,235 @@
+"""One run of a batch: what it is of, by what it is known, and how a worker makes it.
+
+A finished run is a folder named by a hash of all that its results hang on: the scenario as it is read, the files that it
+names, the solver and its options, and the code. What was made once is found again, and a changed input is another run.
+"""
+
+from __future__ import annotations
+
+import hashlib
+import json
+import os
+import shutil
+from collections.abc import Callable, Mapping
+from dataclasses import asdict, dataclass, field
+from functools import cache, cached_property
+from pathlib import Path
+from typing import Any
+
+import numpy as np
+
+from fmus.kernels.jit import VERSIONS, sources
+from fmus.module.variables import ModuleError
+from orchestrator.catalogue import documents
+from orchestrator.catalogue.robot_spec import is_file, load_robot
+from orchestrator.coupling.errors import InputError, RunError, nearest
+from orchestrator.coupling.run.interrupt import Interruption
+from orchestrator.coupling.run.results import Table, plain, read_json, read_table
+from orchestrator.landing import audit, monolithic
+from orchestrator.runs.coupled import run_coupled
+from orchestrator.runs.directory import RunDirectory
+from orchestrator.runs.summary import result
+from orchestrator.runs.systems import System, resolve
+from orchestrator.scenario.read import load
+from orchestrator.scenario.settings import texts
+from orchestrator.scenario.types import GraphScenario, LandingScenario, Scenario
+
+CATALOGUE = Path(documents.__file__).parent
+KEY_DIGITS = 16
+Outcome = tuple[Table, dict[str, Any]]
+
+
+@dataclass(frozen=True)
+class Job:
+    """A scenario with other values, and how it is solved.
+
+    Attributes
+    ----------
+    scenario : path of a scenario file, or the name of a shipped one
+    set : other values by their keys, as for `orchestrator.run`
+    robot : another robot: a name of the catalogue, or a path; None: the scenario's
+    solver : a key of `SOLVERS`
+    interval : s between the times at which the monolithic solver shows its signals; half of it is its longest step
+    tolerance : m, local error of the robot's position that a step of the monolithic solver may make
+    estimate : whether the monolithic solver estimates its error, by a second run
+    signals : names of those that are kept; empty: all but the cable's shape
+    """
+
+    scenario: str
+    set: Mapping[str, Any] = field(default_factory=dict)
+    robot: str | None = None
+    solver: str = "monolithic"
+    interval: float = 0.02
+    tolerance: float = 1e-5
+    estimate: bool = True
+    signals: tuple[str, ...] = ()
+
+    def loaded(self) -> Scenario:
+        """Return the scenario, read and checked; `InputError` says what is wrong with it."""
+        if self.solver not in SOLVERS:
+            known = ", ".join(SOLVERS)
+            raise InputError(
+                f"{self.scenario}: no solver {self.solver!r}{nearest(self.solver, SOLVERS)}; there are {known}"
+            )
+        return load(self.scenario, texts(self.set), self.robot)
+
+    @cached_property
+    def key(self) -> str:
+        """The name of its folder: a hash of all that its results hang on."""
+        scenario = self.loaded()
+        options = asdict(self) | {"scenario": None, "set": None, "robot": None}
+        content = {
+            "resolved": scenario.model_dump(),
+            "named": _named(scenario),
+            "options": options,
+            "code": code_version(),
+        }
+        text = json.dumps(plain(content), sort_keys=True)
+        return hashlib.sha256(text.encode()).hexdigest()[:KEY_DIGITS]
+
+
+def _named(scenario: Scenario) -> dict[str, Any]:
+    """Return what stands in the files that a scenario names: FMUs by their hashes, a robot by its numbers."""
+    if isinstance(scenario, GraphScenario):
+        return {name: _hash(section.fmu) for name, section in scenario.components.items() if section.fmu}
+    sections = {"cable": scenario.cable, "robot": scenario.robot, "contact": scenario.contact}
+    found: dict[str, Any] = {name: _hash(section.fmu) for name, section in sections.items() if section.fmu}
+    model = scenario.robot.model
+    return found | ({"model": asdict(load_robot(model))} if model is not None and is_file(model) else {})
+
+
+def _hash(file: str) -> str:
+    try:
+        return hashlib.sha256(Path(file).read_bytes()).hexdigest()
+    except OSError as error:
+        raise InputError(f"{file}: cannot be read ({error.strerror}); check the path") from None
+
+
+@cache
+def code_version() -> str:
+    """Return a hash of the sources that a run goes through, of the catalogue, and of the libraries' versions."""
+    digest = hashlib.sha256(VERSIONS.encode())
+    for name, content in sorted(sources(__name__).items()):
+        digest.update(f"\0{name}\0{len(content)}\0".encode() + content)
+    for path in sorted(CATALOGUE.rglob("*.toml")):
+        digest.update(f"\0{path.relative_to(CATALOGUE)}\0".encode() + path.read_bytes())
+    return digest.hexdigest()
+
+
+# -- a finished run -------------------------------------------------------------------------------------------
+
+
+@dataclass(frozen=True)
+class Done:
+    """A run that a batch has made, or found.
+
+    Attributes
+    ----------
+    directory : its folder; None where the run left nothing: it crashed, or hung
+    failure : why there are no results, or why they end early; None where all went well
+    """
+
+    job: Job
+    directory: Path | None
+    failure: str | None = None
+
+    @cached_property
+    def table(self) -> Table:
+        """The signals that were kept, ``time`` first; `RunError` where there are none."""
+        if self.failure is not None or self.directory is None:
+            raise RunError(f"{self.job.scenario}: {self.failure}")
+        return read_table(self.directory / "results.csv")
+
+    @cached_property
+    def summary(self) -> dict[str, Any]:
+        """What ``summary.json`` holds; empty where the run left nothing."""
+        return read_json(self.directory / "summary.json") if self.directory is not None else {}
+
+
+def found(job: Job, store: Path) -> Done | None:
+    """Return the finished run of `job` in `store`; None if it has not been made."""
+    directory = store / job.key
+    if not (directory / "manifest.json").is_file():
+        return None
+    return Done(job, directory, read_json(directory / "manifest.json")["error"])
+
+
+def make(job: Job, store: Path) -> None:
+    """Run `job` and put its folder into `store`, whole or not at all; a run that fails leaves a folder that says why."""
+    scenario = job.loaded()
+    failure, table, summary = None, {}, {}
+    try:
+        table, summary = SOLVERS[job.solver](job, scenario)
+    except (InputError, ModuleError, RunError) as error:
+        failure = str(error)
+    temporary = store / f".{job.key}.{os.getpid()}"
+    shutil.rmtree(temporary, ignore_errors=True)
+    directory = RunDirectory(temporary)
+    if table:
+        directory.write_table("results.csv", table)
+    directory.write_json("summary.json", summary)
+    directory.write_manifest(_manifest(job, scenario), failure)
+    _move(temporary, store / job.key)
+
+
+def _manifest(job: Job, scenario: Scenario) -> dict[str, Any]:
+    resolved = scenario.model_dump(exclude_none=True)
+    return {"job": asdict(job), "scenario": str(scenario.path), "resolved": resolved, "code": code_version()}
+
+
+def _move(temporary: Path, place: Path) -> None:
+    """Move a folder into place; where another process was quicker, theirs stays."""
+    try:
+        os.replace(temporary, place)
+    except OSError:
+        if not (place / "manifest.json").is_file():
+            raise
+        shutil.rmtree(temporary, ignore_errors=True)
+
+
+# -- solvers --------------------------------------------------------------------------------------------------
+
+
+def _monolithic(job: Job, scenario: Scenario) -> Outcome:
+    system = resolve(scenario)
+    problem = system.problem()
+    if problem is None:
+        raise InputError(f'{scenario.path}: no monolithic solver for it; take solver = "coupled"')
+    count = round(scenario.simulation.stop_time / job.interval)
+    times = np.linspace(0.0, scenario.simulation.stop_time, max(count, 1) + 1)
+    solution = monolithic.solve(problem, times, job.tolerance, job.estimate)
+    table = {"time": times, **solution.signals}
+    kept = _kept(job, system, table)
+    energy = audit.of_coupled(table, scenario.simulation.tolerances.values())
+    summary = {
+        "solver": job.solver,
+        "steps": solution.steps,
+        "wall_s": solution.wall_s,
+        "tolerance": solution.tolerance,
+        "estimated_error": {name: value for name, value in solution.estimated_error.items() if name in kept},
+        "energy": energy.content() if energy is not None else None,
+        **({"mesh": system.about(table)["mesh"]} if isinstance(scenario, LandingScenario) else {}),
+    }
+    return kept, summary
+
+
+def _coupled(job: Job, scenario: Scenario) -> Outcome:
+    coupled = run_coupled(resolve(scenario))
+    if isinstance(coupled.log.error, Interruption):
+        raise KeyboardInterrupt
+    if coupled.log.error is not None:
+        raise RunError(str(coupled.log.error), coupled.log.error.time)
+    return _kept(job, coupled.system, coupled.table), {"solver": job.solver, **result(coupled).summary}
+
+
+def _kept(job: Job, system: System, table: Table) -> Table:
+    if not job.signals:
+        return system.split(table)[1]
+    missing = [name for name in job.signals if name not in table]
+    if missing:
+        raise InputError(f"{job.scenario}: no signal {missing[0]!r}{nearest(missing[0], table)}")
+    return {name: table[name] for name in ("time", *job.signals)}
+
+
+SOLVERS: dict[str, Callable[[Job, Scenario], Outcome]] = {"monolithic": _monolithic, "coupled": _coupled}
+"""The monolithic solver, several times as quick; or the FMUs under the scenario's master."""
