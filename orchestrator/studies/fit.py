@@ -21,7 +21,8 @@ AT_BOUND = 1e-3
 """Share of the range within which a value counts as lying at its bound."""
 UNDETERMINED = 1e-4
 """Singular values of the sensitivity, by the largest, below which a direction is not determined by the data."""
-PROFILE_ROUNDS = 12
+PROFILE_ROUNDS, NEAR_END = 6, 0.1
+"""Points of a profile at most, and how near, by its distance, the end is foretold well enough."""
 
 Residuals = Callable[[np.ndarray], np.ndarray]
 """From points (m, n), in parameters' own units, to residuals (m, k); not finite where there are none."""
@@ -215,8 +216,8 @@ def _refined(space: _Space, start: np.ndarray, free: np.ndarray) -> np.ndarray:
         inside,
         lambda x: space.slopes(whole(x), free),
         bounds=(0.0, 1.0),
-        xtol=1e-5,
-        ftol=1e-6,
+        xtol=1e-4,
+        ftol=1e-4,
         max_nfev=15,
     )
     return whole(found.x)
@@ -243,32 +244,32 @@ def _interval(
     """Return the ends, as values, of where chi2 minimised over the others stays within `scale` of its least."""
     others = np.delete(np.arange(best.size), index)
     first = float(np.clip(np.sqrt(covariance[index, index]), 1e-3, 0.25))
-    ends = [_end(space, best, index, others, chi2 + scale, sign * first) for sign in (-1.0, 1.0)]
+    ends = [_end(space, best, index, others, chi2, scale, sign * first) for sign in (-1.0, 1.0)]
     low, high = (float(space.parameters[index].value(np.asarray(end))) for end in ends)
     return low, high
 
 
 def _end(
-    space: _Space, best: np.ndarray, index: int, others: np.ndarray, limit: float, step: float
+    space: _Space, best: np.ndarray, index: int, others: np.ndarray, chi2: float, scale: float, step: float
 ) -> float:
-    """Return the share at which the profile reaches `limit` going in the direction of `step`, or the bound."""
-    inside, at, start = float(best[index]), float(best[index]), best
-    outside: float | None = None
+    """Return the share at which the profile rises by `scale`, going in the direction of `step`, or the bound.
+
+    The profile is about a parabola, so that each point foretells where the end is.
+    """
+    point, at = best, float(best[index])
     for _ in range(PROFILE_ROUNDS):
-        at = float(np.clip(inside + step, 0.0, 1.0)) if outside is None else 0.5 * (inside + outside)
-        point = start.copy()
+        at = float(np.clip(best[index] + step, 0.0, 1.0))
+        point = point.copy()
         point[index] = at
         point = _refined(space, point, others)
         residual = space.one(point)
-        if float(residual @ residual) > limit:
-            outside = at
-        else:
-            inside, start, step = at, point, 2.0 * step
-            if at in (0.0, 1.0):
-                return at
-        if outside is not None and abs(outside - inside) < 0.05 * abs(outside - best[index]):
+        by = float(np.sqrt(scale / max(float(residual @ residual) - chi2, 1e-3 * scale)))
+        if at in (0.0, 1.0) and by >= 1.0:
+            return at
+        step = (at - best[index]) * float(np.clip(by, 0.25, 4.0))
+        if abs(by - 1.0) < NEAR_END:
             break
-    return inside if outside is None else 0.5 * (inside + outside)
+    return float(np.clip(best[index] + step, 0.0, 1.0))
 
 
 def _estimate(

@@ -70,8 +70,12 @@ class Sought(Section):
 
 
 class Claims(Section):
-    """Claims of the paper by their ids: those that are fitted, and those that are only foretold."""
+    """Claims of the paper by their ids: those that are fitted, and those that are only foretold.
 
+    `parameter_set`: of the study of the paper, with which its landings are run.
+    """
+
+    parameter_set: str = "physical"
     used: Annotated[list[str], Field(min_length=1)]
     predicted: list[str] = []
 
@@ -135,7 +139,7 @@ class Study(Section):
     """An identification, as it is read."""
 
     title: str
-    scenario: str
+    scenario: str = ""
     seed: Annotated[int, Field(ge=0)] = 1
     set: Settings = {}
     search: Search = Search()
@@ -167,6 +171,8 @@ class Study(Section):
     def _has_data(self) -> Self:
         if self.claims is None and not any(c.used for m in self.measurement for c in m.signals.values()):
             raise ValueError("has no data to fit: name [claims] used = […], or a [[measurement]] with signals")
+        if any(m.scenario is None for m in self.measurement) and not self.scenario:
+            raise ValueError('has a measurement without a scenario; add scenario = "…"')
         return self
 
 
