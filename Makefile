@@ -27,7 +27,7 @@ $(STAMP): pyproject.toml
 
 run: env
 	$(BIN)/orchestrator build
-	$(BIN)/orchestrator compare landing_200m_point9
+	$(BIN)/orchestrator compare landing_200m_point9_physical
 
 # files of tests side by side, on as many processors as there are, but no more than four
 PYTEST := $(BIN)/python -m pytest -n auto --maxprocesses 4 --dist loadfile

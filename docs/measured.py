@@ -18,7 +18,7 @@ FILE = ROOT / "docs" / "measured.json"
 PAGES = (ROOT / "README.md", ROOT / "docs" / "howto" / "choose_master.md")
 BLOCK = re.compile(r"(<!-- measured: (\w+) -->\n).*?(<!-- end -->)", re.S)
 
-SCENARIO, STOP, ROUNDS = "landing_200m_point9", 25.0, 1
+SCENARIO, STOP, ROUNDS = "landing_200m_point9_physical", 25.0, 1
 IMPLICIT, STEPS = ("interface_jacobian", "iqn_ils"), (0.01, 0.005, 0.0025)
 EXPLICIT, SHORT_STEPS, LONG_STEPS = "gauss_seidel", (0.002, 0.001), (0.01, 0.005)
 SIGNALS = {"Z": "robot.body.position.z", "roll": "robot.roll"}

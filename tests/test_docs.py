@@ -23,7 +23,12 @@ from orchestrator.coupling.masters.options import master_options
 ROOT = Path(__file__).resolve().parents[1]
 DOCS = ROOT / "docs"
 EXECUTED = [DOCS / "start.md", *sorted(page for page in (DOCS / "howto").glob("*.md") if page.stem != "index")]
-BY_COMMAND = {DOCS / "verification.md", *DOCS.glob("reference/generated/*.md"), *DOCS.glob("_build/**/*.md")}
+BY_COMMAND = {
+    DOCS / "verification.md",
+    DOCS / "reproduction.md",
+    *DOCS.glob("reference/generated/*.md"),
+    *DOCS.glob("_build/**/*.md"),
+}
 PAGES = {*DOCS.rglob("*.md"), *ROOT.glob("*.md"), *ROOT.glob("fmus/*/README.md")}
 BY_HAND = sorted(PAGES - BY_COMMAND - {ROOT / "CHANGELOG.md"})
 FENCE = re.compile(r"^```(\w+)\n(.*?)^```$", re.M | re.S)
@@ -105,7 +110,7 @@ def test_the_reference_names_every_command_and_option(from_code: Any) -> None:
     page = from_code.command_line_page()
     for option in ("--macro-steps", "--robot", "--set", "--contract"):
         assert f"`{option} " in page
-    for command in ("build", "check", "compare", "list", "modes", "report", "run", "validate"):
+    for command in ("build", "check", "compare", "list", "modes", "report", "reproduce", "run", "validate"):
         assert f"## {command}\n" in page
 
 

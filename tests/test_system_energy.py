@@ -75,6 +75,26 @@ def test_monolithic_books_balance_to_the_estimated_error():
     assert np.log2(drifts[1] / drifts[0]) == pytest.approx(3.0, abs=0.2)
 
 
+DAMPED = {f"cable.parameters.{name}": value for name, value in (("mass_damping", 1.0), ("drag_coefficient", 60.0))}
+"""Sixty times the drag of a strand in air: it takes about as much as the other kinds."""
+
+
+def test_books_balance_with_damping_from_outside():
+    """Bars as without it. What each kind of damping takes is the same, coupled and monolithic, to the coupling's error."""
+    one = scenario(stop=1.0, **DAMPED)
+    coupled = run_coupled(one)
+    solution = solve(lambda: landing.problem(one), coupled.table["time"])
+    books = audit.of_monolithic({"time": solution.time} | solution.signals, solution.estimated_error)
+    assert books.within and books.drift < 1e-7 * books.exchanged
+    assert coupled.energy.within and coupled.energy.drift < 1e-6 * coupled.energy.exchanged
+    parts = [f"cable.dissipated_energy_{kind}" for kind in ("material", "mass", "drag")]
+    whole = coupled.table["cable.dissipated_energy"]
+    np.testing.assert_allclose(sum(coupled.table[name] for name in parts), whole, rtol=1e-14)
+    for name in parts:
+        assert solution.signals[name][-1] > 0.01 * whole[-1]
+        assert coupled.table[name][-1] == pytest.approx(solution.signals[name][-1], abs=1e-6 * coupled.energy.exchanged)
+
+
 @pytest.mark.parametrize("case", ["drop_5cm", "controlled"])
 def test_books_balance_in_impact_and_under_control(case):
     """Impact with sliding; thrust, torque and a driven free wheel."""

@@ -6,7 +6,7 @@ from typing import NamedTuple
 
 import numpy as np
 
-from fmus.cable import element
+from fmus.cable import air, element
 from fmus.kernels.jit import kernel
 
 HALF_BANDWIDTH = 11
@@ -20,6 +20,8 @@ class Model(NamedTuple):
     ----------
     s : (n_elements + 1,) arc lengths of the nodes, m
     ea, ei, damping, density, gravity : N, N m², s, kg/m, m/s²
+    mass_damping, drag : of the damping in proportion to mass 1/s, and of the air, ½ ρ_air C_d d, kg/m²
+    wind : (3,) velocity of the air, m/s
     weight : (n,) generalised force of gravity (eq. 26)
     ends : (2, 3, 3) projectors onto the directions in which the slope of the first and last node may change:
         identity where pinned, d dᵀ (d along the unstressed line) where clamped, so that strain stays free
@@ -31,6 +33,9 @@ class Model(NamedTuple):
     damping: float
     density: float
     gravity: float
+    mass_damping: float
+    drag: float
+    wind: np.ndarray
     weight: np.ndarray
     ends: np.ndarray
 
@@ -77,13 +82,47 @@ def add_inertia(model, a, force, work):
 
 
 @kernel
+def add_outer_damping(model, q, v, force, work):
+    """Add what damping from outside takes to `force` (n,): α M v and the drag of the air; return the power of each, W."""
+    mass = drag = 0.0
+    if model.mass_damping > 0.0:
+        mass = _add_mass_damping(model, v, force, work)
+    if model.drag > 0.0:
+        for e in range(model.s.size - 1):
+            l = model.s[e + 1] - model.s[e]
+            drag += air.add_drag(q, v, 6 * e, l, model.drag, model.wind, force, work.points)
+    return mass, drag
+
+
+@kernel
+def _add_mass_damping(model, v, force, work):
+    """Add α M v to `force` (n,); return α v·M v."""
+    power = 0.0
+    for e in range(model.s.size - 1):
+        element.mass(model.s[e + 1] - model.s[e], model.mass_damping * model.density, work.m)
+        for i in range(4):
+            for j in range(4):
+                for k in range(3):
+                    f = work.m[i, j] * v[6 * e + 3 * j + k]
+                    force[6 * e + 3 * i + k] += f
+                    power += f * v[6 * e + 3 * i + k]
+    return power
+
+
+@kernel
 def residual(model, q, v, a, external, force, work):
-    """Write M a + Q(q, v) - weight - external to `force` (n,), supports not applied; return dissipated power."""
-    power = internal_force(model, q, v, force, work)[1]
+    """Write M a + Q(q, v) + outer damping - weight - external to `force` (n,), supports not applied.
+
+    Returns
+    -------
+    material, mass, drag : power that each kind of damping takes, W; in the order of `state.DISSIPATED`
+    """
+    material = internal_force(model, q, v, force, work)[1]
+    mass, drag = add_outer_damping(model, q, v, force, work)
     add_inertia(model, a, force, work)
     for i in range(force.size):
         force[i] -= model.weight[i] + external[i]
-    return power
+    return material, mass, drag
 
 
 @kernel
@@ -125,6 +164,7 @@ def _constrain_element(matrix, o, p, scale, row):
 def iteration_matrix(model, q, v, cm, cv, cq, band, matrix, work):
     """Write cm M + cv C + cq K with the supports applied to `band` (n, 2 HALF_BANDWIDTH + 1).
 
+    C and K are the derivatives of all forces, those of damping from outside included: C = α M + ….
     `cv`, `cq` and `band` are all real or all complex; `matrix` (12, 12) and work points are workspace of that type.
     """
     band[:, :] = 0.0
@@ -132,12 +172,14 @@ def iteration_matrix(model, q, v, cm, cv, cq, band, matrix, work):
     for e in range(n_elements):
         l = model.s[e + 1] - model.s[e]
         element.tangent(q, v, 6 * e, l, model.ea, model.ei, model.damping, work.K, work.C, work.points)
+        if model.drag > 0.0:
+            air.add_drag_tangent(q, v, 6 * e, l, model.drag, model.wind, work.K, work.C, work.points)
         element.mass(l, model.density, work.m)
         for i in range(12):
             for j in range(12):
                 matrix[i, j] = cv * work.C[i, j] + cq * work.K[i, j]
                 if i % 3 == j % 3:
-                    matrix[i, j] += cm * work.m[i // 3, j // 3]
+                    matrix[i, j] += (cm + cv * model.mass_damping) * work.m[i // 3, j // 3]
         for side in range(2):
             if e == side * (n_elements - 1):
                 _constrain_element(matrix, 6 * side, model.ends[side], matrix[6 - 6 * side, 6 - 6 * side], matrix[12])

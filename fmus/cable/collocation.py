@@ -11,7 +11,7 @@ import numpy as np
 
 from fmus.cable.assembly import constrain_vector, iteration_matrix, residual
 from fmus.cable.ports import moment_work, port_loads
-from fmus.cable.state import DISSIPATED, LAST_INNER, NOT_CONVERGED, OK
+from fmus.cable.state import DISSIPATED, LAST_INNER, N_LOSSES, NOT_CONVERGED, OK
 from fmus.kernels import banded
 from fmus.kernels.jit import kernel
 from fmus.kernels.time_integration import (
@@ -99,7 +99,8 @@ def step(model, method, state, h, offset, ports, tolerance, ahead, work):
             q, v, force = work.q[j], work.v[j], work.residual[j]
             stage(method, j, h, q0, v0, work.a[0], work.a[1], q, v)
             port_loads(model, q, ports, offset + method.c[j] * h, work)
-            work.power[j] = residual(model, q, v, work.a[j], work.external, force, work.element)
+            material, mass, drag = residual(model, q, v, work.a[j], work.external, force, work.element)
+            work.power[j, 0], work.power[j, 1], work.power[j, 2] = material, mass, drag
             constrain_vector(model, force)
         to_mode(method, work.residual, work.mode)
         banded.solve(work.late_band if work.late[0] else work.band, work.mode)
@@ -116,7 +117,8 @@ def step(model, method, state, h, offset, ports, tolerance, ahead, work):
         previous = change
     for j in range(2):
         weight = h * method.b[j]
-        sums[DISSIPATED] += weight * work.power[j]
+        for i in range(N_LOSSES):
+            sums[DISSIPATED + i] += weight * work.power[j, i]
         moment_work(model, work.q[j], work.v[j], ports, offset + method.c[j] * h, weight, sums, work)
     accept(method, h, q0, v0, work.a[0], work.a[1])
     for j in range(2):

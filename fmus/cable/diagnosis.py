@@ -4,9 +4,9 @@ from __future__ import annotations
 
 import numpy as np
 
-from fmus.cable.assembly import add_inertia, dot, internal_force, interpolate, kinetic_energy, locate
+from fmus.cable.assembly import add_inertia, add_outer_damping, dot, internal_force, interpolate, kinetic_energy, locate
 from fmus.cable.ports import port_loads
-from fmus.cable.state import DISSIPATED, LAST_MACRO
+from fmus.cable.state import DISSIPATED, LAST_MACRO, N_LOSSES
 from fmus.kernels.jit import kernel
 
 
@@ -62,8 +62,8 @@ def diagnose(model, method, use_alpha, state, ports, out, rows, work):
     Parameters
     ----------
     ports : (N_PORTS, 13), the loads of the macro step that has just been made
-    out : (13,), receives tension left, mid, right, kinetic, elastic, gravitational and dissipated energy, force of the
-        left support (3) and of the right one (3) on the cable
+    out : (16,), receives tension left, mid, right, kinetic, elastic, gravitational and dissipated energy, force of the
+        left support (3) and of the right one (3) on the cable, the energy dissipated by each kind of damping (3)
     rows : (m, 4), receives position and tension at equally spaced arc lengths
     """
     n = model.weight.size
@@ -71,8 +71,12 @@ def diagnose(model, method, use_alpha, state, ports, out, rows, work):
     out[3] = kinetic_energy(model, v, work.element, force)
     out[4] = internal_force(model, q, v, force, work.element)[0]
     section_forces(force, work.section)
+    add_outer_damping(model, q, v, force, work.element)
     out[5] = -dot(model.weight, q)
-    out[6] = state[4 * n + DISSIPATED]
+    out[6] = 0.0
+    for i in range(N_LOSSES):
+        out[13 + i] = state[4 * n + DISSIPATED + i]
+        out[6] += out[13 + i]
     work.external[:] = 0.0
     if use_alpha:  # M a less the loads is kept, see `end_alpha`
         for i in range(n):

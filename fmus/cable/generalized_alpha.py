@@ -62,7 +62,7 @@ def step(model, method, state, h, offset, ports, tolerance, fresh, work):
     while True:
         _midpoint(method, h, q0, v0, a[0], work)
         port_loads(model, q, ports, at, work)
-        power = residual(model, q, v, work.a[1], work.external, work.residual[0], work.element)
+        material, mass, drag = residual(model, q, v, work.a[1], work.external, work.residual[0], work.element)
         constrain_vector(model, work.residual[0])
         change, left = _correct(cq, work), left - 1
         verdict = judge(change, previous, left, tolerance, SLOW)
@@ -75,7 +75,9 @@ def step(model, method, state, h, offset, ports, tolerance, fresh, work):
             if banded.factorise(work.real_band) != OK:
                 return NOT_CONVERGED
         previous = change
-    sums[DISSIPATED] += h * power
+    sums[DISSIPATED] += h * material
+    sums[DISSIPATED + 1] += h * mass
+    sums[DISSIPATED + 2] += h * drag
     moment_work(model, q, v, ports, at, h, sums, work)
     for i in range(n):
         q0[i] += h * (v0[i] + h * ((0.5 - beta) * a[0, i] + beta * a1[i]))

@@ -84,6 +84,12 @@ _PARAMETERS = [
     parameter("bending_stiffness", "N.m2", 6580.0, "EI", NON_NEGATIVE),
     parameter("linear_density", "kg/m", 0.91, "mass per unstretched length", POSITIVE),
     parameter("damping_time", "s", 0.005, "Kelvin-Voigt damping: ratio of viscosity to stiffness", NON_NEGATIVE),
+    parameter("mass_damping", "1/s", 0.0, "damping in proportion to mass: force by mass and velocity", NON_NEGATIVE),
+    parameter("diameter", "m", 0.0, "outer diameter, for the drag of the air; 0: not given", NON_NEGATIVE),
+    parameter(
+        "drag_coefficient", "1", 0.0, "drag of the air by its dynamic pressure and diameter; 0: none", NON_NEGATIVE
+    ),
+    parameter("air_density", "kg/m3", 1.225, "density of the air, for its drag", NON_NEGATIVE),
     parameter("gravity", "m/s2", 9.8, "acceleration of gravity, towards -z", NON_NEGATIVE),
     Variable("clamped", "parameter", "1", False, "supports hold the transverse slope too", kind="boolean"),
     parameter("integration_step", "s", 0.0025, "longest inner step", POSITIVE),
@@ -120,13 +126,16 @@ _OUTPUTS = (
     ("kinetic_energy", "J", "kinetic energy"),
     ("strain_energy", "J", "elastic energy of stretching and bending"),
     ("gravitational_energy", "J", "potential energy of gravity, zero at z = 0"),
-    ("dissipated_energy", "J", "energy dissipated by material damping"),
+    ("dissipated_energy", "J", "energy dissipated by all kinds of damping"),
     ("reaction_left.x", "N", "force of the left support on the cable, x"),
     ("reaction_left.y", "N", "force of the left support on the cable, y"),
     ("reaction_left.z", "N", "force of the left support on the cable, z"),
     ("reaction_right.x", "N", "force of the right support on the cable, x"),
     ("reaction_right.y", "N", "force of the right support on the cable, y"),
     ("reaction_right.z", "N", "force of the right support on the cable, z"),
+    ("dissipated_energy_material", "J", "part of dissipated_energy: Kelvin-Voigt damping of the material"),
+    ("dissipated_energy_mass", "J", "part of dissipated_energy: damping in proportion to mass"),
+    ("dissipated_energy_drag", "J", "part of dissipated_energy: drag of the air"),
 )
 """Name, unit and meaning of the outputs besides ports and shape, in the order of `diagnose`."""
 
@@ -189,7 +198,7 @@ class Cable:
         self._ports = self._rows("port[1].s", N_PORTS, ports.N_INPUTS)
         self._shown_ports = self._rows("port[1].position.x", N_PORTS, ports.N_SHOWN)
         self._shape = self._rows("shape[1].position.x", N_SHAPE, 4)
-        self._shown = self._rows("tension_left", 1, 13)[0]
+        self._shown = self._rows("tension_left", 1, len(_OUTPUTS))[0]
 
     def _rows(self, first: str, n: int, width: int) -> np.ndarray:
         """Return a view (n, width) of the values from the variable `first` on."""
@@ -202,6 +211,10 @@ class Cable:
     def initialize(self, t: float) -> None:
         """Mesh the cable, find its static equilibrium, start the state there; raises `ModuleError`."""
         check_bounds(self.table, self.values, "cable")
+        if self["drag_coefficient"] > 0.0 and self["diameter"] == 0.0:
+            raise ModuleError(
+                "cable: drag_coefficient: the drag of the air needs the line's diameter; set diameter, in m"
+            )
         if self["sag"] > 0.0:
             self.values[self.table.index["unstretched_length"]] = self._length_for_sag()
         self.model, q = self._rest(self["unstretched_length"])
@@ -235,6 +248,8 @@ class Cable:
             density=self["linear_density"],
             gravity=self["gravity"],
             clamped=bool(self["clamped"]),
+            mass_damping=self["mass_damping"],
+            drag=0.5 * self["air_density"] * self["drag_coefficient"] * self["diameter"],
         )
 
     def _nodes(self, length: float) -> np.ndarray:

@@ -14,8 +14,10 @@ from fmus.cable.assembly import HALF_BANDWIDTH, ElementWork, Model, element_work
 from fmus.kernels import banded
 
 N_PORTS = 4
-DISSIPATED, LAST_INNER, LAST_MACRO, WORK = range(4)
-"""Places behind the coordinates in the state; the work done through each port stands last."""
+N_LOSSES = 3
+"""Kinds of damping whose energy is booked apart: of the material, in proportion to mass, of the air."""
+DISSIPATED, LAST_INNER, LAST_MACRO, WORK = 0, N_LOSSES, N_LOSSES + 1, N_LOSSES + 2
+"""Places behind the coordinates in the state: energy dissipated, by kind; the work done through each port stands last."""
 N_SUMS = WORK + N_PORTS
 OK, NOT_CONVERGED, NOT_FINITE, OFF_CABLE = range(4)
 """Status of a step."""
@@ -78,7 +80,7 @@ def make_work(n: int, state_size: int) -> Work:
         start=np.zeros((N_PORTS, 12)),
         trial=np.zeros(state_size),
         first=np.zeros((N_PORTS, 3)),
-        power=np.zeros(2),
+        power=np.zeros((2, N_LOSSES)),
         means=np.zeros((N_PORTS, 6)),
     )
 

@@ -33,6 +33,8 @@ def mesh_model(
     density: float,
     gravity: float,
     clamped: bool,
+    mass_damping: float = 0.0,
+    drag: float = 0.0,
 ) -> Model:
     """Return the cable with nodes at the arc lengths `s` (n + 1,), m.
 
@@ -46,7 +48,8 @@ def mesh_model(
         np.add.at(weight, 6 * np.arange(l.size) + offset, -density * gravity * share)
     chord = np.array([0.0, span, level_difference]) / np.hypot(span, level_difference)
     free = np.outer(chord, chord) if clamped else np.eye(3)
-    return Model(s, ea, ei, damping, density, gravity, weight, np.stack([free, free]))
+    wind = np.zeros(3)  # still air; the drag is written for any
+    return Model(s, ea, ei, damping, density, gravity, mass_damping, drag, wind, weight, np.stack([free, free]))
 
 
 def catenary(model: Model, span: float, level_difference: float) -> np.ndarray:

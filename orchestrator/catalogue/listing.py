@@ -1,11 +1,11 @@
-"""What there is to choose from, with a line each: scenarios, robots, contact stiffness sets, masters."""
+"""What there is to choose from, with a line each: scenarios, robots, conductors, contact stiffness sets, masters."""
 
 from __future__ import annotations
 
 from collections.abc import Callable
 
+from orchestrator.catalogue import conductor_spec, robot_spec
 from orchestrator.catalogue import contact_sets as sets
-from orchestrator.catalogue import robot_spec
 from orchestrator.catalogue import scenarios as shipped
 from orchestrator.catalogue.documents import chain
 from orchestrator.coupling.errors import InputError
@@ -19,6 +19,16 @@ def scenarios() -> dict[str, str]:
 def robots() -> dict[str, str]:
     """Return the titles of the robots of the catalogue by name; what is wrong with a faulty one in its title's place."""
     return {name: _or_fault(lambda name=name: robot_spec.load_robot(name).title) for name in robot_spec.names()}
+
+
+def conductors() -> dict[str, str]:
+    """Return titles and sets of stiffnesses of the conductors by name; what is wrong with a faulty one in their place."""
+    return {name: _or_fault(lambda name=name: _conductor(name)) for name in conductor_spec.names()}
+
+
+def _conductor(name: str) -> str:
+    spec = conductor_spec.load_conductor(name)
+    return f"{spec.title} ({', '.join(spec.stiffness_sets)})"
 
 
 def contact_sets() -> dict[str, str]:

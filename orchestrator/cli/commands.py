@@ -96,10 +96,10 @@ def build(
 
 @app.command("list")
 def list_() -> None:
-    """List scenarios, robots, contact stiffness sets and masters."""
+    """List scenarios, robots, conductors, contact stiffness sets and masters."""
     from orchestrator.catalogue import listing
 
-    groups = {"Scenarios": listing.scenarios(), "Robots": listing.robots()}
+    groups = {"Scenarios": listing.scenarios(), "Robots": listing.robots(), "Conductors": listing.conductors()}
     groups |= {"Contact stiffness sets": listing.contact_sets(), "Masters": listing.masters()}
     printing.print_catalogue(groups)
 
@@ -273,6 +273,37 @@ def modes(
         write_modes(directory, found)
         draw(out)
     print(f"table and picture in {out}")
+
+
+@app.command()
+def reproduce(
+    out: Annotated[Path, typer.Option(help="Folder of finished runs; none of them is made again.")] = Path(
+        "runs/reproduce"
+    ),
+    docs: Annotated[
+        Path | None, typer.Option(help="Folder of page, JSON and pictures. Default: docs; with --only that of --out.")
+    ] = None,
+    only: Annotated[
+        str | None, typer.Option(metavar="ID,ID,…", help="These claims alone, without the studies.")
+    ] = None,
+    study: Annotated[
+        Path | None, typer.Option(help="Folder with claims.toml and landings.toml. Default: the paper's.")
+    ] = None,
+    workers: Annotated[int | None, typer.Option(min=1, help="Processes. Default: one a processor.")] = None,
+    quiet: options.Quiet = False,
+) -> None:
+    """Hold the paper against our runs, claim by claim.
+
+    Writes reproduction.md and reproduction.json; an interrupted study goes on where it was.
+    """
+    with importing():
+        from orchestrator.studies.reproduce import reproduce as hold
+
+    with printing.counting_bar(quiet, "runs") as progress:
+        done = hold(study, out, docs, _items(only), workers, progress)
+    printing.print_reproduction(done)
+    print(f"page in {done.page}, {done.wall_s:.0f} s")
+    raise typer.Exit(done.exit_status)
 
 
 @app.command()

@@ -18,6 +18,7 @@ if TYPE_CHECKING:
     from orchestrator.runs.compare import Comparison
     from orchestrator.runs.errors import Parts
     from orchestrator.runs.result import Run
+    from orchestrator.studies.reproduce import Reproduction
 
 COLOURS = {
     "ok": "green", "pass": "green", "missing": "red", "wrong": "red", "FAIL": "red", "advice": "yellow",
@@ -175,6 +176,21 @@ def print_modes(found: CableModes) -> None:
     print_table(("mode", "out of plane [Hz]", "damping", "in plane [Hz]", "damping"), rows)
 
 
+def print_reproduction(found: Reproduction) -> None:
+    """Print the verdict on every claim, and on stderr which runs failed."""
+    from orchestrator.studies.markdown import number
+
+    judge = found.book.judged_by
+    ours = [row.ours.get(judge) or next(iter(row.ours.values()), None) for row in found.rows]
+    rows = (
+        (row.claim.id, number(row.claim.values), number(values, 3), row.claim.unit, row.verdict)
+        for row, values in zip(found.rows, ours, strict=True)
+    )
+    print_table(("claim", "paper", f"ours, {judge}", "unit", "verdict"), rows)
+    for line in found.book.failures():
+        complain(line)
+
+
 # -- tables and lines -----------------------------------------------------------------------------------------
 
 
@@ -221,6 +237,31 @@ def progress_bars(quiet: bool) -> Iterator[Callable[[str, float, float], None]]:
             bars.update(tasks[task], completed=time)
 
         yield show
+
+
+@contextmanager
+def counting_bar(quiet: bool, what: str) -> Iterator[Callable[[int, int], None]]:
+    """Give what shows how many of several things are done, and how long the rest will take."""
+    from fmus.kernels import notice
+
+    notice.muted = quiet
+    if quiet:
+        yield lambda done, of: None
+        return
+    from rich.console import Console
+    from rich.progress import (
+        BarColumn,
+        MofNCompleteColumn,
+        Progress,
+        TextColumn,
+        TimeElapsedColumn,
+        TimeRemainingColumn,
+    )
+
+    columns = (BarColumn(), MofNCompleteColumn(), TextColumn(what), TimeElapsedColumn(), TimeRemainingColumn())
+    with Progress(*columns, console=Console(stderr=True)) as bars:
+        task = bars.add_task(what, total=None)
+        yield lambda done, of: bars.update(task, completed=done, total=of)
 
 
 def complain_of(runs: Iterable[Run]) -> None:

@@ -76,9 +76,9 @@ def modes(cable: Cable, count: int) -> CableModes:
     """Return the first `count` modes of either kind about the state of an initialised cable at rest."""
     model = cable.model
     q = cable.state[: model.weight.size].copy()
-    mass, damping, stiffness = (_matrix(model, q, *factors) for factors in np.eye(3))
+    mass, damping, stiffness = (banded_matrix(model, q, np.zeros_like(q), *factors) for factors in np.eye(3))
     found = []
-    for basis in _free_directions(model):
+    for basis in free_directions(model):
         reduced = [basis.T @ matrix @ basis for matrix in (mass, damping, stiffness)]
         found.append(_lowest(reduced, basis, count))
     return CableModes(model, sample(model, q), *found)
@@ -94,18 +94,18 @@ def sample(model: Model, x: np.ndarray) -> np.ndarray:
     return rows
 
 
-def _matrix(model: Model, q: np.ndarray, cm: float, cv: float, cq: float) -> csc_array:
-    """Return cm M + cv C + cq K (n, n)."""
+def banded_matrix(model: Model, q: np.ndarray, v: np.ndarray, cm: float, cv: float, cq: float) -> csc_array:
+    """Return cm M + cv C + cq K (n, n) at coordinates `q` and velocities `v` (n,), the supports applied."""
     n, width = q.size, 2 * HALF_BANDWIDTH + 1
     band = np.zeros((n, width))
-    iteration_matrix(model, q, np.zeros(n), cm, cv, cq, band, np.zeros((13, 12)), element_work())
+    iteration_matrix(model, q, v, cm, cv, cq, band, np.zeros((13, 12)), element_work())
     row = np.repeat(np.arange(n), width)
     column = row + np.tile(np.arange(width) - HALF_BANDWIDTH, n)
     inside = (column >= 0) & (column < n)
     return csc_array((band.ravel()[inside], (row[inside], column[inside])), shape=(n, n))
 
 
-def _free_directions(model: Model) -> tuple[csc_array, csc_array]:
+def free_directions(model: Model) -> tuple[csc_array, csc_array]:
     """Return orthonormal columns (n, m) of what the supports leave free, out of the vertical plane and in it."""
     n = model.weight.size
     ends = [np.linalg.eigh(p) for p in model.ends]

@@ -53,14 +53,14 @@ LEAST_RANGE = 1e-4
 
 
 @contextmanager
-def saved(path: Path, size: tuple[float, float]) -> Iterator[Figure]:
+def saved(path: Path, size: tuple[float, float], dpi: float | None = None) -> Iterator[Figure]:
     """Give a figure of `size` (inches) and save it, whole or not at all: not if a run has diverged beyond any axis."""
     with matplotlib.rc_context(STYLE), np.errstate(over="ignore"):
         figure = Figure(figsize=size)
         FigureCanvasAgg(figure)  # draws without a display, and measures what is drawn
         yield figure
         with suppress(OverflowError), replacing(path) as temporary:
-            figure.savefig(temporary)
+            figure.savefig(temporary, dpi=dpi or STYLE["savefig.dpi"])
 
 
 def line_style(i: int, n: int = 1) -> dict[str, Any]:

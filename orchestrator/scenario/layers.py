@@ -132,10 +132,10 @@ def _flat(table: Document, prefix: str = "") -> Iterator[tuple[str, Any]]:
 
 
 def resolve_paths(document: Document, folder: Path) -> None:
-    """Make the paths of FMUs and of robots' files absolute; they are relative to the file in which they stand."""
+    """Make the paths of FMUs, robots' and conductors' files absolute; they are relative to the file in which they stand."""
     for place in _sections(document):
         section = _table(document, place) or {}
-        for key in ("fmu", "model"):
+        for key in ("fmu", "model", "conductor"):
             text = bare(section.get(key))
             if isinstance(text, str) and (key == "fmu" or robot_spec.is_file(text)):
                 path = str((folder / text).absolute())

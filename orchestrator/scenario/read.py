@@ -16,6 +16,7 @@ from orchestrator.catalogue.scenarios import find
 from orchestrator.coupling.errors import InputError
 from orchestrator.scenario import layers
 from orchestrator.scenario.check import check, known_variables, to_si
+from orchestrator.scenario.conductor import fill_line
 from orchestrator.scenario.contact_set import fill_in
 from orchestrator.scenario.inertia import scale_inertia
 from orchestrator.scenario.types import GraphScenario, LandingScenario, Provenance, Scenario
@@ -50,11 +51,14 @@ def load(
     provenance: dict[str, Provenance] = {}
     plain = _unwrap(stack, stack.document, "", provenance, problems)
     layers.resolve_paths(plain, path.parent)
+    if "cable" in plain:
+        plain.setdefault("contact", {})  # it shares the line's diameter
     known, unknown = known_variables(plain)
     problems += [*unknown, *to_si(plain, known, provenance)]
-    notes += scale_inertia(plain, provenance)
+    said, wrong = fill_line(plain, known, provenance)
+    notes += [*said, *scale_inertia(plain, provenance)]
     scenario, invalid = _validated(plain)
-    problems += [*invalid, *check(plain, known)]
+    problems += [*wrong, *invalid, *check(plain, known)]
     if problems or scenario is None:
         raise InputError(f"{stack.place_of(problem.path)}: {problem}" for problem in problems)
     return scenario.read_from(path, _with_robot_file(plain, provenance), notes)

@@ -76,10 +76,13 @@ class Simulation(Section):
 class CableSection(Section):
     """The cable: parameters by their names in the contract; `fmu` is a foreign one instead of ours.
 
+    `conductor` is one of the catalogue, or a TOML file like those there; `stiffness_set` one of its sets. Without a
+    conductor the latter is a label. What `parameters` give themselves stands.
     `steps`, here and below: steps that the FMU makes in each step of the master (docs/reference/masters.md).
     """
 
     fmu: str | None = None
+    conductor: str | None = None
     stiffness_set: str = "unnamed"
     steps: Count = 1
     parameters: Settings = {}

@@ -1,24 +1,17 @@
-"""The files of a study: ``landings.toml``, what is run, and ``claims.toml``, what is held against it; read and checked once."""
+"""The files of a study, as types: ``landings.toml``, what is run, and ``claims.toml``, what is held against it."""
 
 from __future__ import annotations
 
-from collections.abc import Iterable, Iterator, Mapping
+from collections.abc import Iterable
 from dataclasses import dataclass
 from pathlib import Path
-from typing import Annotated, Any, Literal, TypeVar
+from typing import Annotated, Any, Literal
 
-from pydantic import BaseModel, Field, ValidationError, model_validator
+from pydantic import Field, model_validator
 
-from orchestrator.catalogue.documents import read
-from orchestrator.catalogue.quantities import complaints
 from orchestrator.coupling.errors import InputError, nearest
 from orchestrator.scenario.types import Section
-from orchestrator.studies.formulas import FORMULAS
-from orchestrator.studies.measures import MEASURES
-from orchestrator.studies.proofs import PROOFS
 
-PACKAGE = Path(__file__).parent
-Read = TypeVar("Read", bound=BaseModel)
 Settings = dict[str, Any]
 Value = float | list[float]
 Positive = Annotated[float, Field(gt=0.0)]
@@ -29,7 +22,7 @@ class ParameterSet(Section):
     """Other values that every landing is run with; a column of the tables."""
 
     title: str
-    set: Settings = {}
+    set: Settings = Field(default_factory=dict)
 
 
 class Landing(Section):
@@ -38,7 +31,7 @@ class Landing(Section):
     title: str
     scenario: str
     robot: str | None = None
-    set: Settings = {}
+    set: Settings = Field(default_factory=dict)
     sets: list[str] | None = None
 
 
@@ -47,7 +40,7 @@ class Variant(Section):
 
     name: str
     value: float | None = None
-    set: Settings = {}
+    set: Settings = Field(default_factory=dict)
     landing: str | None = None
     interval: Positive | None = None
 
@@ -59,8 +52,8 @@ class Series(Section):
     landing: str
     parameter_set: str
     key: str | None = None
-    values: list[float | int] = []
-    variant: list[Variant] = []
+    values: list[float | int] = Field(default_factory=list)
+    variant: list[Variant] = Field(default_factory=list)
 
     @property
     def variants(self) -> list[Variant]:
@@ -84,11 +77,11 @@ class Landings(Section):
 
     interval: Positive = 0.02
     tolerance: Positive = 1e-5
-    signals: list[str] = []
+    signals: list[str] = Field(default_factory=list)
     sets: Annotated[dict[str, ParameterSet], Field(min_length=1)]
     landings: dict[str, Landing]
-    series: dict[str, Series] = {}
-    assumed: list[Assumed] = []
+    series: dict[str, Series] = Field(default_factory=dict)
+    assumed: list[Assumed] = Field(default_factory=list)
 
 
 class CannotHold(Section):
@@ -121,10 +114,10 @@ class Claim(Section):
     paper: Value
     measure: str | None = None
     signal: str | None = None
-    landings: list[str] = []
+    landings: list[str] = Field(default_factory=list)
     take: Literal["each", "range"] = "each"
     formula: str | None = None
-    parts: list[str] = []
+    parts: list[str] = Field(default_factory=list)
     undecidable: str | None = None
     sense: Literal["equal", "at least", "at most"] = "equal"
     tolerance: NonNegative = 0.0
@@ -172,65 +165,9 @@ class Documents:
         """Return the claims `ids` with the parts they are made of; all, if none is named. `InputError` for an unknown one."""
         known = {claim.id: claim for claim in self.claims.claim}
         wanted = list(ids)
-        unknown = [f"--only: no claim {name!r}{nearest(name, known)}; {self.folder}/claims.toml has them all" for name in wanted if name not in known]
+        where = f"{self.folder / 'claims.toml'} has them all"
+        unknown = [f"--only: no claim {name!r}{nearest(name, known)}; {where}" for name in wanted if name not in known]
         if unknown:
             raise InputError(unknown)
         names = dict.fromkeys([*wanted, *(part for name in wanted for part in known[name].parts)])
         return [claim for claim in self.claims.claim if not wanted or claim.id in names]
-
-
-def shipped(name: str = "paper") -> Path:
-    """Return the folder of a shipped study: in the package, or beside it in a clone."""
-    inside = PACKAGE / name
-    return inside if inside.is_dir() else PACKAGE.parents[1] / "studies" / name
-
-
-def load_study(folder: Path) -> Documents:
-    """Read the two files in `folder`; `InputError` with all that is wrong with them."""
-    landings, claims = (_read(folder / f"{model.__name__.lower()}.toml", model) for model in (Landings, Claims))
-    found = Documents(folder, landings, claims)
-    problems = [f"{folder / 'landings.toml'}: {line}" for line in _of_landings(landings)]
-    problems += [f"{folder / 'claims.toml'}: {line}" for line in _of_claims(claims, landings)]
-    if problems:
-        raise InputError(problems)
-    return found
-
-
-def _read(path: Path, model: type[Read]) -> Read:
-    try:
-        return model.model_validate(read(path))
-    except ValidationError as error:
-        raise InputError(f"{path}: {problem}" for problem in complaints(error, model)) from None
-
-
-def _of_landings(found: Landings) -> Iterator[str]:
-    for name, landing in found.landings.items():
-        yield from _unknown(f"landings.{name}.sets", landing.sets or [], found.sets, "set")
-    for name, series in found.series.items():
-        wanted = [series.landing, *(v.landing for v in series.variant if v.landing is not None)]
-        yield from _unknown(f"series.{name}.landing", wanted, found.landings, "landing")
-        yield from _unknown(f"series.{name}.parameter_set", [series.parameter_set], found.sets, "set")
-        if bool(series.values) != (series.key is not None):
-            yield f"series.{name}: key and values belong together; give both, or variants alone"
-
-
-def _of_claims(found: Claims, landings: Landings) -> Iterator[str]:
-    yield from _unknown("judged_by", [found.judged_by], landings.sets, "set")
-    ids = [claim.id for claim in found.claim]
-    for i, claim in enumerate(found.claim, start=1):
-        place = f"claim[{i}] ({claim.id})"
-        if ids.count(claim.id) > 1 and ids.index(claim.id) < i - 1:
-            yield f"{place}: there is a claim of that id above; give it another id"
-        yield from _unknown(f"{place}.landings", claim.landings, landings.landings, "landing")
-        yield from _unknown(f"{place}.measure", filter(None, [claim.measure]), MEASURES, "measure")
-        yield from _unknown(f"{place}.formula", filter(None, [claim.formula]), FORMULAS, "formula")
-        yield from _unknown(f"{place}.parts", claim.parts, ids, "claim")
-        if claim.cannot_hold is not None:
-            yield from _unknown(f"{place}.cannot_hold.proof", [claim.cannot_hold.proof], PROOFS, "proof")
-
-
-def _unknown(place: str, names: Iterable[str], known: Iterable[str] | Mapping[str, object], kind: str) -> Iterator[str]:
-    have = list(known)
-    for name in names:
-        if name not in have:
-            yield f"{place}: no {kind} {name!r}{nearest(name, have)}; there are {', '.join(have)}"

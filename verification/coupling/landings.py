@@ -28,7 +28,7 @@ class Landing(NamedTuple):
 
 LANDINGS = {
     "20 m from the tower": Landing("landing_200m_point9"),
-    "the same, physical": Landing("landing_200m_point9_physical"),
+    "the same, physical": Landing("landing_200m_point9_undamped"),
     "midspan": Landing("landing_200m_midspan"),
     "drop from 5 cm": Landing("drop_5cm"),
     "inclined rig": Landing("rig_10m_inclined"),
@@ -39,7 +39,7 @@ OTHERS = {
     "rig": Landing("rig_10m"),
     "10 kg": Landing("landing_200m_point9", "fptlir_10kg"),
     "hard drop, k = 1e10": Landing("drop_5cm", settings=("contact.parameters.stiffness=1e10",)),
-    "100 kg, 40 m from the tower": Landing("landing_200m_point9_physical", "fptlir_100kg", FORTY),
+    "100 kg, 40 m from the tower": Landing("landing_200m_point9_undamped", "fptlir_100kg", FORTY),
     "two wheels, another robot": Landing("landing_200m_point9", "hybrid_robot_1"),
 }
 """Landings that no choice of the coupling was made by."""

@@ -16,7 +16,7 @@ from verification.system.setups import FLAGSHIP, estimated, monolithic, scenario
 TITLE = "Error estimate of the reference"
 CASES = {
     FLAGSHIP: 25.0,
-    "landing_200m_point9_physical": 25.0,
+    "landing_200m_point9_undamped": 25.0,
     "landing_200m_midspan": 25.0,
     "rig_10m": 25.0,
     "drop_5cm": 2.0,

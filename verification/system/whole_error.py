@@ -33,7 +33,7 @@ LINES: dict[str, tuple[str, tuple[float, ...]]] = {
     "rig, 10 m": ("rig_10m", ()),
     "60 m": ("landing_200m_point9", (60.0, 0.6, 2.0, 0.7, 1.5e7, 300.0)),
     "200 m, table1": ("landing_200m_point9", ()),
-    "200 m, physical": ("landing_200m_point9_physical", ()),
+    "200 m, physical": ("landing_200m_point9_undamped", ()),
     "300 m, inclined": ("landing_200m_point9", (300.0, 6.0, 12.0, 0.964, 2.11e7, 821.0)),
     "500 m": ("landing_200m_point9", (500.0, 14.0, 0.0, 1.35, 3.4e7, 1500.0)),
 }

@@ -10,7 +10,7 @@ from __future__ import annotations
 import numpy as np
 
 from fmus.cable.assembly import constrain_vector, locate, residual
-from fmus.cable.state import DISSIPATED, LAST_INNER
+from fmus.cable.state import DISSIPATED, LAST_INNER, N_LOSSES
 from fmus.contact import places as at
 from fmus.kernels import banded, dense
 from fmus.kernels.jit import kernel
@@ -150,7 +150,8 @@ def _residuals(system, state, h, space, work):
         contacts.loads(system, space.stage[j], points, space.trial, state.contacts, out, forces, space)
         _external(model, space.arc[j], forces, work)
         force = work.residual[j]
-        work.power[j] = residual(model, work.q[j], work.v[j], work.a[j], work.external, force, work.element)
+        material, mass, drag = residual(model, work.q[j], work.v[j], work.a[j], work.external, force, work.element)
+        work.power[j, 0], work.power[j, 1], work.power[j, 2] = material, mass, drag
         constrain_vector(model, force)
         for i in range(N_ROBOT):
             space.c[j, i] = space.b[j, i] - forces[6 * n_wheels + i]
@@ -195,7 +196,9 @@ def _accept(system, state, h, space, work):
     accept(method, h, state.cable[:n], state.cable[n : 2 * n], work.a[0], work.a[1])
     for i in range(n):
         state.cable[2 * n + i], state.cable[3 * n + i] = work.a[0, i], work.a[1, i]
-    state.cable[4 * n + DISSIPATED] += h * (method.b[0] * work.power[0] + method.b[1] * work.power[1])
+    for i in range(N_LOSSES):
+        power = method.b[0] * work.power[0, i] + method.b[1] * work.power[1, i]
+        state.cable[4 * n + DISSIPATED + i] += h * power
     state.cable[4 * n + LAST_INNER] = h
     for j in range(2):
         power = rb.control_power(system.robot, space.stage[j], system.control)

@@ -1,0 +1,91 @@
+"""Conductors: one TOML file each with its sets of stiffnesses, every number with its unit and source."""
+
+from __future__ import annotations
+
+from pathlib import Path
+from typing import Annotated
+
+from pydantic import BaseModel, ConfigDict, Field, PrivateAttr, ValidationError
+
+from orchestrator.catalogue.documents import Stack, chain
+from orchestrator.catalogue.quantities import POSITIVE, Number, complaints, in_unit
+from orchestrator.coupling.errors import InputError, nearest
+
+FOLDER = Path(__file__).parent / "conductors"
+
+
+class Strict(BaseModel):
+    """A part of the file: unknown keys are errors, values do not change. Numbers are SI once they are read."""
+
+    model_config = ConfigDict(extra="forbid", frozen=True)
+
+
+class StiffnessSet(Strict):
+    """EA and EI that belong together."""
+
+    axial_stiffness: Annotated[Number, POSITIVE, in_unit("N")]
+    bending_stiffness: Annotated[Number, POSITIVE, in_unit("N.m2")]
+
+
+class ConductorSpec(Strict):
+    """A conductor.
+
+    Attributes
+    ----------
+    title : one line for people
+    youngs_modulus, metallic_area : Pa, m²; what the sets come from
+    stiffness_sets : by name
+    """
+
+    title: str
+    notes: str = ""
+    diameter: Annotated[Number, POSITIVE, in_unit("m")]
+    linear_density: Annotated[Number, POSITIVE, in_unit("kg/m")]
+    youngs_modulus: Annotated[Number, POSITIVE, in_unit("Pa")]
+    metallic_area: Annotated[Number, POSITIVE, in_unit("m2")]
+    stiffness_sets: Annotated[dict[str, StiffnessSet], Field(min_length=1)]
+    _path: Path = PrivateAttr(default=Path("conductor.toml"))
+
+    @property
+    def path(self) -> Path:
+        """The conductor's file."""
+        return self._path
+
+    def parameters(self, stiffness_set: str) -> dict[str, Number]:
+        """Return the cable's parameters by name, SI, with one of the sets of stiffnesses."""
+        chosen = self.stiffness_sets[stiffness_set]
+        return {
+            "diameter": self.diameter,
+            "linear_density": self.linear_density,
+            "axial_stiffness": chosen.axial_stiffness,
+            "bending_stiffness": chosen.bending_stiffness,
+        }
+
+
+def load_conductor(name_or_path: str) -> ConductorSpec:
+    """Return the conductor of a catalogue name, or of a path that ends in ``.toml``; `InputError` says what is wrong."""
+    stack, path = Stack(), _find(name_or_path, Path())
+    for file, document in chain(path, _find):
+        stack.put(document, str(file))
+    try:
+        spec = ConductorSpec.model_validate(stack.document)
+    except ValidationError as error:
+        found = complaints(error, ConductorSpec)
+        raise InputError(f"{stack.place_of(one.path)}: {one}" for one in found) from None
+    spec._path = path
+    return spec
+
+
+def names() -> list[str]:
+    """Return the names of the catalogue, whatever their files hold."""
+    return sorted(path.stem for path in FOLDER.glob("*.toml"))
+
+
+def _find(name_or_path: str, folder: Path) -> Path:
+    """Return the file of a conductor; a path is relative to `folder`."""
+    if name_or_path.endswith(".toml"):
+        return folder / name_or_path
+    if name_or_path not in names():
+        hint = nearest(name_or_path, names()) or f"; choose {', '.join(names())}, or the path of a .toml file"
+        raise InputError(f"no conductor {name_or_path!r} in the catalogue{hint}")
+    return FOLDER / f"{name_or_path}.toml"
