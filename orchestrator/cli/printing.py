@@ -13,8 +13,8 @@ import typer
 
 if TYPE_CHECKING:
     from orchestrator.landing.contract import Finding
-    from orchestrator.landing.limits import Limits
     from orchestrator.landing.modes import CableModes
+    from orchestrator.landing.safety import Limits
     from orchestrator.runs.compare import Comparison
     from orchestrator.runs.errors import Parts
     from orchestrator.runs.result import Run

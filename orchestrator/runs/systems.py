@@ -35,10 +35,10 @@ from orchestrator.landing.build import has_monolithic, problem
 from orchestrator.landing.contract import is_control, is_unused
 from orchestrator.landing.fields import cable_fields
 from orchestrator.landing.impacts import Impact, impacts
-from orchestrator.landing.limits import Limits, limits_of
+from orchestrator.landing.limits import limits_of
 from orchestrator.landing.resolve import MESH_KEYS, MESH_TOLERANCE, Landing, Variables
 from orchestrator.landing.resolve import resolve as resolve_landing
-from orchestrator.landing.safety import Safety, judge
+from orchestrator.landing.safety import Limits, Safety, judge
 from orchestrator.landing.wiring import inner_step, lacking, landing_graph
 from orchestrator.scenario.types import CableSection, Component, GraphScenario, LandingScenario, RobotSection, Scenario
 
