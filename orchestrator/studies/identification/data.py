@@ -12,7 +12,7 @@ from orchestrator.coupling.errors import InputError, nearest
 from orchestrator.coupling.run.results import Table
 from orchestrator.runs.job import Job
 from orchestrator.scenario.types import Scenario
-from orchestrator.studies import documents
+from orchestrator.studies import reading
 from orchestrator.studies.book import job_of, measured
 from orchestrator.studies.documents import Claim, Documents
 from orchestrator.studies.identification.measured import Series, end_of, read_series
@@ -129,11 +129,13 @@ def _of_claims(study: Study) -> Iterator[tuple[dict[str, Job], Datum]]:
     """Yield the claims that the study names, each with the runs of its landings."""
     if study.claims is None:
         return
-    paper = documents.load_study(documents.shipped())
+    paper = reading.load_study(reading.shipped())
     known = {claim.id: claim for claim in paper.claims.claim}
     problems = list(_claim_problems(study, known))
     if study.claims.parameter_set not in (sets := paper.landings.sets):
-        problems.append(f"no set {study.claims.parameter_set!r}{nearest(study.claims.parameter_set, sets)}; there are {', '.join(sets)}")
+        problems.append(
+            f"no set {study.claims.parameter_set!r}{nearest(study.claims.parameter_set, sets)}; there are {', '.join(sets)}"
+        )
     if problems:
         raise InputError(f"{study.path}: claims: {problem}" for problem in problems)
     wanted = [known[name] for name in (*study.claims.used, *study.claims.predicted)]

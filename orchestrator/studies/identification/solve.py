@@ -2,7 +2,7 @@
 
 from __future__ import annotations
 
-from collections.abc import Callable, Sequence
+from collections.abc import Callable, Iterator, Sequence
 from dataclasses import dataclass
 from pathlib import Path
 
@@ -17,7 +17,7 @@ from orchestrator.studies.identification.study import Study
 
 Told = Callable[[str, int, float], None]
 """Told the stage, the sets of parameters calculated so far, and the least sum of squares."""
-RUN_TIMEOUT = 120.0
+RUN_TIMEOUT = 600.0
 """s that a landing may take; one that takes longer counts as one that cannot be calculated."""
 
 
@@ -64,6 +64,31 @@ class Identified:
     outcomes: list[Outcome]
     failures: int
 
+    @property
+    def doubts(self) -> list[str]:
+        """What keeps the parameters from being taken at their word, a line each."""
+        return list(_doubts(self))
+
+
+def _doubts(found: Identified) -> Iterator[str]:
+    for one in found.fit.estimates:
+        if not one.determined:
+            yield f"{one.name}: the data do not determine it; any value does that keeps to its correlation with others"
+        if one.at_bound:
+            yield f"{one.name}: lies at its {one.at_bound} bound; the data ask for more"
+    missed = [one.datum.name for one in found.outcomes if one.datum.used and not one.met]
+    if missed:
+        yield f"fitted and yet missed by more than their uncertainty: {', '.join(missed)}"
+    if found.fit.scale > 1.0:
+        yield (
+            f"variances and intervals are widened by {found.fit.scale:.3g}, as if every uncertainty were "
+            f"{found.fit.scale**0.5:.3g} times as large"
+        )
+    elif found.fit.residual.size <= len(found.fit.estimates):
+        yield "as many parameters as values or more: what is met says nothing of the model"
+    if any(one.datum.time is not None for one in found.outcomes) and found.fit.scale > 1.0:
+        yield "values of a time series are counted as independent; where their errors are not, deviations are larger"
+
 
 def identify(
     study: Study, store: Path, workers: int | None = None, told: Told = lambda stage, count, least: None
@@ -87,9 +112,7 @@ def identify(
     with Batches(store, workers, RUN_TIMEOUT) as batches:
         _probe(study, whole, batches)
         residuals = _Residuals(study, used, batches)
-        found = fit(
-            study.sought, residuals, effort, lambda stage, least: told(stage, residuals.count, least)
-        )
+        found = fit(study.sought, residuals, effort, lambda stage, least: told(stage, residuals.count, least))
         ours = _calculated(whole, batches, [found.values])[0]
     outcomes = [Outcome(datum, values) for datum, values in zip(whole.data, ours, strict=True)]
     return Identified(study, found, outcomes, residuals.failures)
@@ -136,6 +159,8 @@ def _probe(study: Study, whole: Experiment, batches: Batches) -> None:
     middle = {one.name: float(one.value(np.asarray(0.5))) for one in study.sought}
     done = batches.run(whole.jobs(middle))
     names = zip(whole.landings, done, strict=True)
-    failures = [f"{study.path}: {name}, in the middle of the bounds: {one.failure}" for name, one in names if one.failure]
+    failures = [
+        f"{study.path}: {name}, in the middle of the bounds: {one.failure}" for name, one in names if one.failure
+    ]
     if failures:
         raise RunError("\n".join(failures))

@@ -1,18 +1,18 @@
 """The file of an identification: what is looked for, between which bounds and why, and by which data.
 
-    title = "Damping of my line"
-    scenario = "rig_10m"
+title = "Damping of my line"
+scenario = "rig_10m"
 
-    [parameters."cable.parameters.mass_damping"]
-    from = 0.01
-    to = 3.0
-    unit = "1/s"
-    scale = "log"
-    reason = "still air to a storm"
+[parameters."cable.parameters.mass_damping"]
+from = 0.01
+to = 3.0
+unit = "1/s"
+scale = "log"
+reason = "still air to a storm"
 
-    [[measurement]]
-    file = "landing_3.csv"
-    signals.roll = { signal = "robot.roll", unit = "deg", uncertainty = 0.05 }
+[[measurement]]
+file = "landing_3.csv"
+signals.roll = { signal = "robot.roll", unit = "deg", uncertainty = 0.05 }
 """
 
 from __future__ import annotations
@@ -24,9 +24,10 @@ from pydantic import Field, PrivateAttr, ValidationError, model_validator
 
 from orchestrator.catalogue.documents import read
 from orchestrator.catalogue.quantities import complaints
-from orchestrator.coupling.errors import InputError
+from orchestrator.coupling.errors import InputError, nearest
 from orchestrator.scenario.types import Count, Positive, Section
 from orchestrator.studies.fit import Parameter
+from orchestrator.studies.reading import shipped
 
 Settings = dict[str, Any]
 
@@ -58,7 +59,7 @@ class Sought(Section):
     unit: str = ""
     scale: Literal["linear", "log"] = "linear"
     reason: Annotated[str, Field(min_length=1)]
-    applies: list[Target] = []
+    applies: list[Target] = Field(default_factory=list)
 
     @model_validator(mode="after")
     def _in_order(self) -> Self:
@@ -77,12 +78,12 @@ class Claims(Section):
 
     parameter_set: str = "physical"
     used: Annotated[list[str], Field(min_length=1)]
-    predicted: list[str] = []
+    predicted: list[str] = Field(default_factory=list)
 
     @model_validator(mode="after")
     def _once(self) -> Self:
         every = [*self.used, *self.predicted]
-        if (twice := sorted({name for name in every if every.count(name) > 1})):
+        if twice := sorted({name for name in every if every.count(name) > 1}):
             raise ValueError(f"{', '.join(twice)} stands there twice; a claim is used, or it is foretold")
         return self
 
@@ -120,7 +121,7 @@ class Measurement(Section):
 
     file: str
     scenario: str | None = None
-    set: Settings = {}
+    set: Settings = Field(default_factory=dict)
     time: str = "time"
     time_unit: str = "s"
     start: float = 0.0
@@ -141,11 +142,11 @@ class Study(Section):
     title: str
     scenario: str = ""
     seed: Annotated[int, Field(ge=0)] = 1
-    set: Settings = {}
+    set: Settings = Field(default_factory=dict)
     search: Search = Search()
     parameters: Annotated[dict[str, Sought], Field(min_length=1)]
     claims: Claims | None = None
-    measurement: list[Measurement] = []
+    measurement: list[Measurement] = Field(default_factory=list)
     _path: Path = PrivateAttr(default=Path("study.toml"))
 
     @property
@@ -174,6 +175,18 @@ class Study(Section):
         if any(m.scenario is None for m in self.measurement) and not self.scenario:
             raise ValueError('has a measurement without a scenario; add scenario = "…"')
         return self
+
+
+def path_of(name: str) -> Path:
+    """Return the path of a study: that of a file, or of one that is shipped with the study of the paper."""
+    folder = shipped() / "identify"
+    beside = folder / f"{name}.toml"
+    if name.endswith(".toml") or Path(name).exists() or not beside.is_file():
+        if not Path(name).is_file():
+            known = sorted(path.stem for path in folder.glob("*.toml"))
+            raise InputError(f"{name}: no such study{nearest(name, known)}; give a TOML file, or {', '.join(known)}")
+        return Path(name)
+    return beside
 
 
 def load_study(path: Path) -> Study:

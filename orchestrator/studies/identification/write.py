@@ -3,7 +3,7 @@
 from __future__ import annotations
 
 import os
-from collections.abc import Iterator
+from collections.abc import Iterable, Iterator
 from pathlib import Path
 from typing import Any
 
@@ -19,7 +19,6 @@ from orchestrator.studies.identification.solve import Identified, Outcome
 STORE = "landings"
 """Folder of the landings that were calculated."""
 RESULT = "identification.json"
-AXIS = {"m": "m", "rad": "rad", "deg": "deg", "N": "N"}
 
 
 def place_of(out: Path | None, name: str) -> Path:
@@ -67,6 +66,7 @@ def content(found: Identified) -> dict[str, Any]:
         "predicted": outcomes[False],
         "evaluations": fit.evaluations,
         "failures": found.failures,
+        "doubts": found.doubts,
         **circumstances(),
     }
 
@@ -95,6 +95,40 @@ def _outcome(one: Outcome) -> dict[str, Any]:
     return {**common, "data": one.datum.value, "ours": one.ours, "uncertainty": one.datum.uncertainty}
 
 
+# -- rows, for the terminal and the page ------------------------------------------------------------------------
+
+
+PARAMETERS = ("parameter", "unit", "found", "deviation", "interval", "from", "to", "")
+DATA = ("data", "unit", "given", "ours", "uncertainty", "", "met")
+
+
+def parameter_rows(found: Identified) -> Iterator[tuple[str, ...]]:
+    """Yield a row for each parameter, under `PARAMETERS`."""
+    for one in found.fit.estimates:
+        sought = found.study.parameters[one.name]
+        interval = "" if one.interval is None else f"{one.interval[0]:.4g} to {one.interval[1]:.4g}"
+        deviation = f"{one.deviation:.2g}" if np.isfinite(one.deviation) else "open"
+        said = "not determined" if not one.determined else f"at its {one.at_bound} bound" if one.at_bound else ""
+        numbers = (f"{one.value:.5g}", deviation, interval, f"{sought.low:g}", f"{sought.high:g}")
+        yield one.name, sought.unit or "1", *numbers, said
+
+
+def data_rows(found: Identified) -> Iterator[tuple[str, ...]]:
+    """Yield a row for each datum, under `DATA`."""
+    for one in found.outcomes:
+        use = "fitted" if one.datum.used else "foretold"
+        yield one.datum.name, one.datum.unit, *_cells(one), use, "yes" if one.met else "no"
+
+
+def _cells(one: Outcome) -> tuple[str, str, str]:
+    if one.datum.time is not None:
+        return f"{one.ours.size} values", f"rms {one.rms:.3g} uncertainties", f"{one.datum.uncertainty[0]:.3g}"
+    given, ours, uncertainty = (
+        ", ".join(f"{x:.4g}" for x in values) for values in (one.datum.value, one.ours, one.datum.uncertainty)
+    )
+    return given, ours, uncertainty
+
+
 # -- the page -------------------------------------------------------------------------------------------------
 
 
@@ -102,74 +136,42 @@ def _page(found: Identified, pictures: list[Path]) -> Iterator[str]:
     fit = found.fit
     yield f"# {found.study.title}"
     yield ""
-    yield f"{fit.evaluations} sets of parameters were calculated (seed {found.study.seed})" + (
-        f", {found.failures} of them could not be." if found.failures else "."
-    )
+    failed = f", {found.failures} of them could not be" if found.failures else ""
+    yield f"{fit.evaluations} sets of parameters were calculated (seed {found.study.seed}){failed}."
     yield ""
-    yield "| parameter | unit | found | deviation | interval | bounds | |"
-    yield "|---|---|---|---|---|---|---|"
-    for one in fit.estimates:
-        yield _parameter_row(found, one)
+    yield from _table(PARAMETERS, parameter_rows(found))
+    yield from (f"- {name}: {one.reason}" for name, one in found.study.parameters.items())
     yield ""
     yield from _said(found)
     yield "## Correlation"
     yield ""
     names = [one.name for one in fit.estimates]
-    yield f"| | {' | '.join(names)} |"
-    yield f"|---|{'---|' * len(names)}"
-    for name, row in zip(names, fit.correlation, strict=True):
-        yield f"| {name} | {' | '.join('open' if np.isnan(x) else f'{x:.2f}' for x in row)} |"
-    for title, used in (("Fitted", True), ("Foretold, not fitted", False)):
-        yield from _table(title, [one for one in found.outcomes if one.datum.used == used])
-    for picture in pictures:
-        yield ""
-        yield f"![{picture.stem}]({picture.name})"
+    rows = ([name, *map(_correlation, row)] for name, row in zip(names, fit.correlation, strict=True))
+    yield from _table(("", *names), rows)
+    yield "## Data"
+    yield ""
+    yield from _table(DATA, data_rows(found))
+    yield from (f"![{picture.stem}]({picture.name})\n" for picture in pictures)
 
 
-def _parameter_row(found: Identified, one: Estimate) -> str:
-    sought = found.study.parameters[one.name]
-    interval = "" if one.interval is None else f"{one.interval[0]:.4g} to {one.interval[1]:.4g}"
-    said = "not determined by the data" if not one.determined else f"at its {one.at_bound} bound" if one.at_bound else ""
-    deviation = "open" if not np.isfinite(one.deviation) else f"{one.deviation:.2g}"
-    bounds = f"{sought.low:g} to {sought.high:g}: {sought.reason}"
-    return f"| {one.name} | {sought.unit or '1'} | {one.value:.5g} | {deviation} | {interval} | {bounds} | {said} |"
+def _correlation(value: float) -> str:
+    return "open" if np.isnan(value) else f"{value:.2f}"
+
+
+def _table(head: Iterable[str], rows: Iterable[Iterable[str]]) -> Iterator[str]:
+    names = list(head)
+    yield f"| {' | '.join(names)} |"
+    yield f"|{'---|' * len(names)}"
+    yield from (f"| {' | '.join(row)} |" for row in rows)
+    yield ""
 
 
 def _said(found: Identified) -> Iterator[str]:
     """Yield what the numbers above mean, and how far they can be trusted."""
-    fit = found.fit
-    yield f"Sum of squares {fit.chi2:.4g} of {fit.residual.size} values."
-    if fit.scale > 1.0:
-        yield (
-            f"The data are missed by more than their uncertainty allows: variances and intervals are widened by "
-            f"{fit.scale:.3g}, as if every uncertainty were {np.sqrt(fit.scale):.3g} times as large."
-        )
-    if any(one.datum.time is not None for one in found.outcomes):
-        yield (
-            "Values of a time series are counted as independent. Where their errors are not, the deviations are larger "
-            "than shown."
-        )
+    yield f"Sum of squares {found.fit.chi2:.4g} of {found.fit.residual.size} values."
     yield "Deviation: one standard deviation, linearised. Interval: where the sum of squares has risen by as much."
+    yield from found.doubts
     yield ""
-
-
-def _table(title: str, outcomes: list[Outcome]) -> Iterator[str]:
-    if not outcomes:
-        return
-    yield ""
-    yield f"## {title}"
-    yield ""
-    yield "| | unit | data | ours | uncertainty | met |"
-    yield "|---|---|---|---|---|---|"
-    for one in outcomes:
-        yield f"| {one.datum.name} | {one.datum.unit} | {_cells(one)} | {'yes' if one.met else 'no'} |"
-
-
-def _cells(one: Outcome) -> str:
-    if one.datum.time is not None:
-        return f"{one.ours.size} values | rms {one.rms:.3g} uncertainties | {one.datum.uncertainty[0]:.3g}"
-    groups = (one.datum.value, one.ours, one.datum.uncertainty)
-    return " | ".join(", ".join(f"{x:.4g}" for x in values) for values in groups)
 
 
 # -- pictures -------------------------------------------------------------------------------------------------
