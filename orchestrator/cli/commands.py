@@ -17,6 +17,7 @@ from typer.core import TyperGroup
 
 import orchestrator
 from orchestrator.cli import modes, new, options, printing
+from orchestrator.cli.identify import identify
 from orchestrator.cli.start import importing
 
 
@@ -67,6 +68,7 @@ app = typer.Typer(
     "2 wrong input; 3 the run failed; 130 interrupted.",
 )
 app.add_typer(new.app, name="new")
+app.command()(identify)
 
 
 def _print_version(asked: bool) -> None:
