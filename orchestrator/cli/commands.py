@@ -242,7 +242,8 @@ def compare(
         raise
     printing.print_comparison(done)
     pictures = "" if no_pictures else f", pictures in {done.directory}/plots"
-    print(f"verdict: {'pass' if done.passed else 'FAIL'}; results in {done.directory}{pictures}")
+    unsafe = ", but the landing is not (clearly) safe" if done.safe is False else ""
+    print(f"verdict: {'pass' if done.passed else 'FAIL'}{unsafe}; results in {done.directory}{pictures}")
     printing.complain_of(done.results)
     raise typer.Exit(done.exit_status)
 
