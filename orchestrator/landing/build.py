@@ -13,7 +13,7 @@ from orchestrator.scenario.types import LandingScenario
 if TYPE_CHECKING:
     from orchestrator.landing.monolithic import Problem
 
-NOT_NEEDED = ("initial.", ".braked", ".inertia", ".axle_direction", "integration_step", "n_wheels", "center_of_mass")
+NOT_NEEDED = ("initial.", ".braked", ".inertia", ".axle_", "integration_step", "n_wheels", "center_of_mass")
 """Robot parameters that a reference takes at their defaults where a foreign robot does not have them."""
 
 
