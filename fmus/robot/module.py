@@ -80,6 +80,7 @@ def _wheel_inputs(wheel: str) -> list[Variable]:
         Variable(f"{wheel}.drive_torque", "input", "N.m", 0.0, "torque of the body on the wheel, about the axle"),
         *vector(f"{wheel}.force_rate", "input", "N/s", "slope of the contact force within the macro step"),
         *vector(f"{wheel}.moment_rate", "input", "N.m/s", "slope of the contact moment within the macro step"),
+        Variable(f"{wheel}.drive_torque_rate", "input", "N.m/s", 0.0, "slope of the drive torque within the macro step"),
     ]
 
 
@@ -121,8 +122,10 @@ def robot_table(n_wheels: int) -> VariableTable:
             _number_of_wheels(n_wheels),
             *_BODY,
             *(v for wheel in wheels for v in _wheel_parameters(wheel)),
-            Variable("thrust", "input", "N", 0.0, "thrust along z_B, acting at b"),
-            *vector("torque", "input", "N.m", "control torque, components in B"),
+            Variable("thrust", "input", "N", 0.0, "thrust along z_B, acting at b, mean over the macro step"),
+            *vector("torque", "input", "N.m", "control torque, components in B, mean over the macro step"),
+            Variable("thrust_rate", "input", "N/s", 0.0, "slope of the thrust within the macro step"),
+            *vector("torque_rate", "input", "N.m/s", "slope of the control torque within the macro step"),
             *(v for wheel in wheels for v in _wheel_inputs(wheel)),
             *_body_outputs(),
             *(v for wheel in wheels for v in _wheel_outputs(wheel)),
