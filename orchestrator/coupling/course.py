@@ -140,8 +140,8 @@ def read_columns(path: Path) -> tuple[list[float], dict[str, list[float]]]:
     if len(set(names)) < len(names):
         raise InputError(f"{path}: two columns have one name; rename one of them")
     numbers = [_numbers(path, i, row, len(names)) for i, row in enumerate(rows[1:], start=2)]
-    time, *columns = zip(*numbers, strict=True) if numbers else [() for _ in names]
-    return list(time), dict(zip(names[1:], map(list, columns), strict=True))
+    columns = {name: [row[i] for row in numbers] for i, name in enumerate(names)}
+    return columns.pop("time"), columns
 
 
 def _numbers(path: Path, line: int, row: Iterable[str], n: int) -> list[float]:

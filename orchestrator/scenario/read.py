@@ -70,10 +70,12 @@ def _unwrap(
     for key, value in table.items():
         path = prefix + key
         if is_over_time(value):
-            table = parse(path, value)
-            problems += table.problems
-            found[path] = replace(_provenance(value, stack.place_of(path)), written=table.written, sha256=table.sha256)
-            plain |= {key: table.value} if table.value is not None else {}
+            parsed = parse(path, value)
+            problems += parsed.problems
+            found[path] = replace(
+                _provenance(value, stack.place_of(path)), written=parsed.written, sha256=parsed.sha256
+            )
+            plain |= {key: parsed.value} if parsed.value is not None else {}
             continue
         if isinstance(value, dict) and not is_quantity(value):
             plain[key] = _unwrap(stack, value, f"{path}.", found, problems)
