@@ -103,7 +103,7 @@ def _problem(folder: Path, old: str, new: str) -> str:
         ("seed = 1", "sed = 1", "sed: unknown key; did you mean seed?"),
         ('file = "measured.csv"', 'file = "nothing.csv"', "nothing.csv"),
         ("signals.z =", "signals.height =", "no column 'height'"),
-        ("robot.body.position.z", "robot.body.position.zz", "no signal 'robot.body.position.zz'; did you mean body.position.z?"),
+        ("robot.body.position.z", "robot.body.position.zz", "zz'; did you mean body.position.z?"),
         ('unit = "mm"', 'unit = "kg"', "unit 'kg' does not fit"),
         ("uncertainty = 1.0", "uncertainty = 0.0", "greater than 0"),
         ('scenario = "drop_5cm"', 'scenario = "drop_6cm"', "drop_6cm"),
