@@ -14,6 +14,7 @@ import typer
 if TYPE_CHECKING:
     from orchestrator.landing.contract import Finding
     from orchestrator.landing.modes import CableModes
+    from orchestrator.landing.robot_modes import SystemModes
     from orchestrator.landing.safety import Limits
     from orchestrator.runs.compare import Comparison
     from orchestrator.runs.errors import Parts
@@ -180,6 +181,22 @@ def print_modes(found: CableModes) -> None:
         for k in range(count)
     ]
     print_table(("mode", "out of plane [Hz]", "damping", "in plane [Hz]", "damping"), rows)
+
+
+def print_robot_modes(found: SystemModes, count: int) -> None:
+    """Print the first `count` modes of the line with the robot on it, and what is to be said of them."""
+    from orchestrator.landing.robot_modes import SHARES
+
+    few = found.first(count)
+    numbers = zip(few.kinds, few.frequency, few.damping_ratio, few.growth, few.shares, strict=True)
+    rows = [
+        (str(k), kind, f"{f:.5g}", f"{zeta:.3g}", f"{growth:.3g}", *(f"{abs(100.0 * share):.0f}" for share in shares))
+        for k, (kind, f, zeta, growth, shares) in enumerate(numbers, start=1)
+    ]
+    head = ("mode", "", "frequency [Hz]", "damping", "growth [1/s]", *(f"{share} [%]" for share in SHARES))
+    print_table(head, rows)
+    for warning in found.warnings:
+        complain(warning)
 
 
 def print_reproduction(found: Reproduction) -> None:
