@@ -14,6 +14,7 @@ import orchestrator
 from fmus.kernels.rotations import from_euler, rotate
 from orchestrator.catalogue.library import robot_fmu
 from orchestrator.catalogue.robot_spec import load_robot
+from orchestrator.cli.printing import print_comparison
 from orchestrator.coupling.errors import InputError
 from orchestrator.landing import workspace
 from orchestrator.landing.limits import landing_only, limits_of
@@ -347,7 +348,7 @@ def test_the_same_signals_within_the_paper_s_limits_are_safe(run: orchestrator.R
     assert replace(safety, faults=["fell"]).safe is False
 
 
-def test_a_comparison_judges_its_runs_and_the_reference(tmp_path: Path):
+def test_a_comparison_judges_its_runs_and_the_reference(tmp_path: Path, capsys: pytest.CaptureFixture[str]):
     out = tmp_path / "all"
     found = orchestrator.compare("landing_200m_point9", stop=0.1, set={"limits.tension": 0.2}, out=out, pictures=False)
     assert found.passed and found.reference.safe is False and found.results[0].safe is False and found.exit_status == 1
@@ -355,6 +356,9 @@ def test_a_comparison_judges_its_runs_and_the_reference(tmp_path: Path):
     assert mine.worst == pytest.approx(theirs["worst"], rel=1e-3) and mine.time == theirs["time"]
     read = orchestrator.load_comparison(out)
     assert read.reference.safety == found.reference.safety and read.exit_status == 1
+    print_comparison(read)
+    shown = capsys.readouterr().out
+    assert "reference: NOT SAFE until 0.1 s: tension exceeded" in shown and "EXCEEDED" in shown
     page = report(out).read_text(encoding="utf-8")
     assert "safety, reference" in page and "tension exceeded" in page and (out / "plots" / "limits.png").is_file()
 

@@ -17,6 +17,7 @@ from typer.core import TyperGroup
 
 import orchestrator
 from orchestrator.cli import modes, new, options, printing
+from orchestrator.cli.identify import identify
 from orchestrator.cli.start import importing
 
 
@@ -67,6 +68,7 @@ app = typer.Typer(
     "2 wrong input; 3 the run failed; 130 interrupted.",
 )
 app.add_typer(new.app, name="new")
+app.command()(identify)
 
 
 def _print_version(asked: bool) -> None:
@@ -240,7 +242,8 @@ def compare(
         raise
     printing.print_comparison(done)
     pictures = "" if no_pictures else f", pictures in {done.directory}/plots"
-    print(f"verdict: {'pass' if done.passed else 'FAIL'}; results in {done.directory}{pictures}")
+    unsafe = ", but the landing is not (clearly) safe" if done.safe is False else ""
+    print(f"verdict: {'pass' if done.passed else 'FAIL'}{unsafe}; results in {done.directory}{pictures}")
     printing.complain_of(done.results)
     raise typer.Exit(done.exit_status)
 

@@ -53,14 +53,20 @@ def print_run(run: Run) -> None:
         print(f"energy drift: {run.energy.drift:.2g} J of {run.energy.exchanged:.3g} J exchanged")
 
 
-def print_safety(said: Mapping[str, Any]) -> None:
-    """Print each limit with its worst value and margin, the verdict, and what is not judged; `said` as ``summary.json``."""
+def print_safety(said: Mapping[str, Any], whose: str = "") -> None:
+    """Print each limit with its worst value and margin, the verdict, and what is not judged.
+
+    Parameters
+    ----------
+    said : as in ``summary.json``
+    whose : what it is said of, where there are several
+    """
     from orchestrator.landing.safety import HEAD, rows, why_not_judged
 
     if said.get("limits"):
         print_table(HEAD, rows(said))
     if said.get("safety"):
-        typer.secho(said["safety"], fg={True: "green", False: "red", None: "yellow"}[said["safe"]])
+        typer.secho(f"{whose}{said['safety']}", fg={True: "green", False: "red", None: "yellow"}[said["safe"]])
         for line in why_not_judged(said):
             print(f"not judged: {line}")
 
@@ -123,15 +129,15 @@ def print_comparison(comparison: Comparison) -> None:
     print_table(("master", "H [s]", "iterations", "unconverged", "cable steps", "wall [s]"), _costs(comparison))
     print("error, by the signal's range; the coupling's includes that of the inner steps")
     print_table(("master", "H [s]", "signal", "coupling", "mesh", "whole", "allowed", "verdict"), _checks(comparison))
-    _print_safeties(comparison)
     for master, orders in comparison.observed_order.items():
         shown = ", ".join(f"{name} {orders[name]:.2f}" for name in comparison.tolerance if name in orders)
         print(f"observed order, {master}: {shown}")
+    _print_safeties(comparison)
 
 
 def _print_safeties(comparison: Comparison) -> None:
     """Print whether the landing was safe by the reference, with its margins, and by each run."""
-    print_safety(comparison.reference.safety)
+    print_safety(comparison.reference.safety, "reference: ")
     for run in comparison.results:
         if run.safety:
             print(f"{run.label}: {run.safety}")
