@@ -92,6 +92,7 @@ class _Contacts:
     def __init__(self, problem: Problem):
         integrator = Integrator(problem)
         self.system, self.space, self.shape = integrator.system, integrator.space, integrator.work.shape
+        self.control = integrator.loads.in_the_end
         self.memory = integrator.state.contacts
         self.arcs = self.memory[:, ARC].copy()
         self.feet = self.arcs
@@ -105,7 +106,8 @@ class _Contacts:
         cable_points(system, q, v, arcs, space.cable_point, self.shape)
         if walls(system, robot, space.cable_point, self.memory, self.out, space) != OK:
             raise ModuleError("modes: the contact law fails on the way to rest; check the pose of the robot")
-        loads(system, robot, space.cable_point, bristles, self.memory, self.out, space.generalized, space)
+        given = self.memory, self.out, space.generalized
+        loads(system, self.control, robot, space.cable_point, bristles, *given, space)
         self.feet = arcs
         found = np.zeros(q.size + N_ROBOT)
         found[q.size :] = space.generalized[6 * arcs.size :]
