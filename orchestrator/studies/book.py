@@ -119,7 +119,8 @@ def jobs_of_sensitivity(documents: Documents, landing: str) -> dict[Key, Job]:
 
 def _variant(documents: Documents, series: Series, variant: Variant) -> Job:
     landing = documents.landings.landings[variant.landing or series.landing]
-    return _job(documents, landing, series.parameter_set, variant.set, variant.interval, estimate=False)
+    parameter_set = variant.parameter_set or series.parameter_set
+    return _job(documents, landing, parameter_set, variant.set, variant.interval, estimate=False)
 
 
 def _job(

@@ -36,10 +36,11 @@ class Landing(Section):
 
 
 class Variant(Section):
-    """One run of a series: its `name`, and the number it stands for, if it has one."""
+    """One run of a series: its `name`, the number it stands for, if it has one, and what of the series it has not."""
 
     name: str
     value: float | None = None
+    parameter_set: str | None = None
     set: Settings = Field(default_factory=dict)
     landing: str | None = None
     interval: Positive | None = None
