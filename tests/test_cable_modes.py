@@ -83,7 +83,9 @@ def test_many_unknowns_take_the_sparse_way():
 
 def test_command(tmp_path):
     out = tmp_path / "modes"
-    result = CliRunner().invoke(app, ["modes", "scenarios/rig_10m.toml", "--count", "3", "--out", str(out)])
+    result = CliRunner().invoke(
+        app, ["modes", "scenarios/rig_10m.toml", "--without-robot", "--count", "3", "--out", str(out)]
+    )
     assert result.exit_code == 0, result.output
     with (out / "modes.csv").open() as file:
         rows = list(csv.reader(file))
@@ -93,5 +95,5 @@ def test_command(tmp_path):
 
 
 def test_command_wants_a_positive_count():
-    result = CliRunner().invoke(app, ["modes", "scenarios/rig_10m.toml", "--count", "0"])
+    result = CliRunner().invoke(app, ["modes", "scenarios/rig_10m.toml", "--without-robot", "--count", "0"])
     assert result.exit_code == 2

@@ -14,14 +14,16 @@ import orchestrator
 from fmus.kernels.rotations import from_euler, rotate
 from orchestrator.catalogue.library import robot_fmu
 from orchestrator.catalogue.robot_spec import load_robot
+from orchestrator.cli.printing import print_comparison
 from orchestrator.coupling.errors import InputError
 from orchestrator.landing import workspace
-from orchestrator.landing.limits import UNITS, Limit, Limits, landing_only, limits_of
+from orchestrator.landing.limits import landing_only, limits_of
 from orchestrator.landing.resolve import resolve
-from orchestrator.landing.safety import Safety, judge
+from orchestrator.landing.safety import UNITS, Limit, Limits, Safety, judge, series
 from orchestrator.landing.workspace import NoRoom
 from orchestrator.report.limits import limits as draw_limits
 from orchestrator.report.page import report
+from orchestrator.runs.coupled import run_coupled
 from orchestrator.runs.systems import LandingSystem
 from orchestrator.scenario.read import load
 from tests.scenarios import LANDING, OSCILLATOR
@@ -346,7 +348,7 @@ def test_the_same_signals_within_the_paper_s_limits_are_safe(run: orchestrator.R
     assert replace(safety, faults=["fell"]).safe is False
 
 
-def test_a_comparison_judges_its_runs_and_the_reference(tmp_path: Path):
+def test_a_comparison_judges_its_runs_and_the_reference(tmp_path: Path, capsys: pytest.CaptureFixture[str]):
     out = tmp_path / "all"
     found = orchestrator.compare("landing_200m_point9", stop=0.1, set={"limits.tension": 0.2}, out=out, pictures=False)
     assert found.passed and found.reference.safe is False and found.results[0].safe is False and found.exit_status == 1
@@ -354,6 +356,35 @@ def test_a_comparison_judges_its_runs_and_the_reference(tmp_path: Path):
     assert mine.worst == pytest.approx(theirs["worst"], rel=1e-3) and mine.time == theirs["time"]
     read = orchestrator.load_comparison(out)
     assert read.reference.safety == found.reference.safety and read.exit_status == 1
+    print_comparison(read)
+    shown = capsys.readouterr().out
+    assert "reference: NOT SAFE until 0.1 s: tension exceeded" in shown and "EXCEEDED" in shown
+    page = report(out).read_text(encoding="utf-8")
+    assert "safety, reference" in page and "tension exceeded" in page and (out / "plots" / "limits.png").is_file()
+
+
+SLIPPERY = ("simulation.stop_time=1.0", "simulation.macro_step=0.005", "contact.parameters.friction_coefficient=0.01")
+
+
+def slid(*overrides: str) -> tuple[float, dict[str, np.ndarray]]:
+    """How far (m) the robot has slid on the inclined rig, and all signals."""
+    system = LandingSystem(resolve(landing_only(load("rig_10m_inclined", [*SLIPPERY, *overrides]))))
+    signals = run_coupled(system).table
+    return float(series("slip", signals)[1][-1]), signals
+
+
+def test_a_locked_wheel_slides_as_far_as_its_contact_goes():
+    """But for what the swing of the robot turns the wheel, and for the way of one macro step."""
+    slip, signals = slid()
+    way = abs(signals["contact1.cable.s"][-1] - signals["contact1.cable.s"][0])
+    turned = 0.075 * np.ptp(signals["robot.roll"])
+    assert way > 0.1 and abs(slip - way) < turned + 0.005 * np.max(signals["contact1.slip_velocity"])
+
+
+def test_a_wheel_that_turns_freely_goes_as_far_and_does_not_slide():
+    free = ("robot.parameters.wheel[1].braked=false", "robot.parameters.wheel[1].inertia=1e-4")
+    slip, signals = slid("contact.parameters.friction_coefficient=0.5", *free)
+    assert abs(signals["contact1.cable.s"][-1] - signals["contact1.cable.s"][0]) > 0.1 and slip < 1e-3
 
 
 def test_a_graph_is_no_landing():

@@ -46,12 +46,13 @@ GENERAL |= components("wheel[2].axle_direction", (1.0, 2.0, -0.5))
 GENERAL |= components("initial.position", (0.4, 80.0, -1.5)) | components("initial.velocity", (0.5, -0.2, 0.1))
 GENERAL |= components("initial.angular_velocity", (0.9, -1.4, 1.1))
 
-LOADS = {"thrust": 50.0} | components("torque", (1.0, -2.0, 0.5))
+LOADS = {"thrust": 50.0, "thrust_rate": 90.0} | components("torque", (1.0, -2.0, 0.5))
+LOADS |= components("torque_rate", (4.0, 3.0, -2.0))
 LOADS |= components("wheel[1].force", (10.0, -5.0, 40.0)) | components("wheel[1].force_rate", (100.0, 60.0, -200.0))
 LOADS |= components("wheel[1].moment", (1.0, 3.0, -2.0)) | components("wheel[1].moment_rate", (20.0, -30.0, 10.0))
 LOADS |= components("wheel[2].force", (-4.0, 6.0, 20.0)) | components("wheel[2].force_rate", (50.0, -80.0, 30.0))
 LOADS |= components("wheel[2].moment", (0.5, -1.0, 1.5)) | components("wheel[2].moment_rate", (-9.0, 12.0, 7.0))
-LOADS["wheel[2].drive_torque"] = 0.8
+LOADS |= {"wheel[2].drive_torque": 0.8, "wheel[2].drive_torque_rate": -1.5}
 
 
 def make(n_wheels=1, /, **settings):
@@ -114,10 +115,11 @@ class Reference:
         R, p, L, axial = y[3:12].reshape(3, 3), y[12:15], y[15:18], y[18]
         w, spin = self.velocities(R, L, axial)
         v = p / self.values["mass"]
-        thrust, torque = R @ [0, 0, self.values["thrust"]], R @ self.get("torque")
+        lift = self.values["thrust"] + since_middle * self.values["thrust_rate"]
+        drive = self.values["wheel[2].drive_torque"] + since_middle * self.values["wheel[2].drive_torque_rate"]
+        thrust, torque = R @ [0, 0, lift], R @ (self.get("torque") + since_middle * self.get("torque_rate"))
         force, moment = thrust - [0, 0, 9.8 * self.values["mass"]], np.cross(-R @ self.G, thrust) + torque
         v_b = v + np.cross(w, -R @ self.G)
-        drive = self.values["wheel[2].drive_torque"]
         power = [thrust @ v_b + torque @ w + drive * spin]
         poses, turns, running = [], [], []
         for k, arm in enumerate(self.mounts, start=1):
@@ -387,7 +389,7 @@ def test_reference_point_does_not_matter(shift):
             moved[f"{name}.{axis}"] += value
     robots = [make(2, **chosen) for chosen in (GENERAL, moved)]
     for robot in robots:
-        robot.table.assign(robot.values, LOADS | {"thrust": 0.0})  # thrust acts at b
+        robot.table.assign(robot.values, LOADS | {"thrust": 0.0, "thrust_rate": 0.0})  # thrust acts at b
         run(robot, 0.2, 0.02)
     for name in WHEEL_SIGNALS:
         np.testing.assert_allclose(vector(robots[0], name), vector(robots[1], name), rtol=0, atol=1e-12)

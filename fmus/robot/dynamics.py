@@ -1,7 +1,8 @@
 """One macro step of the robot: inner steps of Runge–Kutta, and what is remembered of the step (kernels).
 
-Inputs over a macro step (4 + 13 n,)
-    loads at an instant as in rigid_body.py, and for each wheel the slopes of force 7:10 and moment 10:13.
+Inputs over a macro step (8 + 14 n,)
+    thrust and torque and their slopes 4:8; for each wheel the loads at an instant as in rigid_body.py, and the slopes of
+    force 7:10, moment 10:13 and drive torque 13.
 Module state (25 + 13 n,)
     rigid-body state 0:21; roll, pitch, yaw without jumps 21:24; work of the control 24;
     for each wheel position_mean 0:3, axle_mean 3:6, rotation 6:9, rotation_mean 9:12, work 12.
@@ -45,7 +46,8 @@ from fmus.robot.rigid_body import (
 )
 
 # Places and sizes of what the module takes, keeps and shows; those of a wheel are counted from its first.
-FORCE_RATE, MOMENT_RATE, WHEEL_INPUTS = 7, 10, 13
+BODY_RATES, BODY_INPUTS = BODY_LOADS, 2 * BODY_LOADS
+FORCE_RATE, MOMENT_RATE, DRIVE_RATE, WHEEL_INPUTS = 7, 10, 13, 14
 ANGLES, CONTROL_WORK, MEMORY = 21, 24, 25
 POSITION_MEAN, AXLE_MEAN, TURNED, TURNED_MEAN, WHEEL_WORK, WHEEL_MEMORY = 0, 3, 6, 9, 12, 13
 BODY_OUTPUTS, WHEEL_OUTPUTS = 15, 25
@@ -74,13 +76,13 @@ DONE, TURNS_TOO_FAST, NOT_FINITE = 0, 1, 2
 def loads_at(inputs, n_wheels, since_middle, loads):
     """Write the loads at `since_middle` (s) after the middle of the macro step."""
     for i in range(BODY_LOADS):
-        loads[i] = inputs[i]
+        loads[i] = inputs[i] + inputs[BODY_RATES + i] * since_middle
     for k in range(n_wheels):
-        i = BODY_LOADS + WHEEL_INPUTS * k
+        i = BODY_INPUTS + WHEEL_INPUTS * k
         j = BODY_LOADS + WHEEL_LOADS * k
         for c in range(6):
             loads[j + c] = inputs[i + c] + inputs[i + FORCE_RATE + c] * since_middle
-        loads[j + DRIVE] = inputs[i + DRIVE]
+        loads[j + DRIVE] = inputs[i + DRIVE] + inputs[i + DRIVE_RATE] * since_middle
 
 
 @kernel
@@ -175,7 +177,7 @@ def book_work(prm, inputs, start, y, step_size, memory, motion):
     for k in range(int(prm[N_WHEELS])):
         wheel_motion(prm, y, k, motion)
         m = MEMORY + WHEEL_MEMORY * k
-        j = BODY_LOADS + WHEEL_INPUTS * k
+        j = BODY_INPUTS + WHEEL_INPUTS * k
         for i in range(3):
             x0, x1, mean = start[3 * k + i], motion[i], memory[m + POSITION_MEAN + i]
             angle, angle_mean = y[ROTATION + 3 * k + i], memory[m + TURNED_MEAN + i]

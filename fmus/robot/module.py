@@ -60,6 +60,8 @@ def _wheel_parameters(wheel: str) -> list[Variable]:
     return [
         *vector(f"{wheel}.mount", "parameter", "m", "wheel centre from b, in B", (0.0, 0.0, 0.2152)),
         *vector(f"{wheel}.axle_direction", "parameter", "1", "axle in B, of any length", (1.0, 0.0, 0.0)),
+        parameter(f"{wheel}.axle_yaw", "rad", 0.0, "misalignment: turn of the axle about z_B from axle_direction"),
+        parameter(f"{wheel}.axle_tilt", "rad", 0.0, "misalignment: turn of the axle about y_B, before axle_yaw"),
         Variable(f"{wheel}.braked", "parameter", "1", True, "fixed to the body, not free to spin", kind="boolean"),
         parameter(
             f"{wheel}.inertia",
@@ -78,6 +80,9 @@ def _wheel_inputs(wheel: str) -> list[Variable]:
         Variable(f"{wheel}.drive_torque", "input", "N.m", 0.0, "torque of the body on the wheel, about the axle"),
         *vector(f"{wheel}.force_rate", "input", "N/s", "slope of the contact force within the macro step"),
         *vector(f"{wheel}.moment_rate", "input", "N.m/s", "slope of the contact moment within the macro step"),
+        Variable(
+            f"{wheel}.drive_torque_rate", "input", "N.m/s", 0.0, "slope of the drive torque within the macro step"
+        ),
     ]
 
 
@@ -119,8 +124,10 @@ def robot_table(n_wheels: int) -> VariableTable:
             _number_of_wheels(n_wheels),
             *_BODY,
             *(v for wheel in wheels for v in _wheel_parameters(wheel)),
-            Variable("thrust", "input", "N", 0.0, "thrust along z_B, acting at b"),
-            *vector("torque", "input", "N.m", "control torque, components in B"),
+            Variable("thrust", "input", "N", 0.0, "thrust along z_B, acting at b, mean over the macro step"),
+            *vector("torque", "input", "N.m", "control torque, components in B, mean over the macro step"),
+            Variable("thrust_rate", "input", "N/s", 0.0, "slope of the thrust within the macro step"),
+            *vector("torque_rate", "input", "N.m/s", "slope of the control torque within the macro step"),
             *(v for wheel in wheels for v in _wheel_inputs(wheel)),
             *_body_outputs(),
             *(v for wheel in wheels for v in _wheel_outputs(wheel)),
@@ -150,16 +157,25 @@ def inertia_tensor(values: np.ndarray, table: VariableTable) -> np.ndarray:
     return tensor
 
 
-def _wheel_row(values: np.ndarray, table: VariableTable, wheel: str) -> np.ndarray:
-    """Return the wheel's part of the kernels' parameters (8,)."""
+def axle_in_body(values: np.ndarray, table: VariableTable, wheel: str) -> np.ndarray:
+    """Return the axle of ``wheel[k]`` in B, a unit vector (3,): its direction, turned by its misalignment."""
     axle = _vector(values, table, f"{wheel}.axle_direction")
     length = float(np.linalg.norm(axle))
     if length == 0.0:
         raise ModuleError(f"{wheel}.axle_direction: has no length; give a direction such as 1, 0, 0")
+    turn = np.zeros(4)
+    tilt, yaw = (float(values[table.index[f"{wheel}.axle_{name}"]]) for name in ("tilt", "yaw"))
+    from_euler(0.0, tilt, yaw, turn)
+    return np.array(rotate(turn, *(axle / length)))
+
+
+def _wheel_row(values: np.ndarray, table: VariableTable, wheel: str) -> np.ndarray:
+    """Return the wheel's part of the kernels' parameters (8,)."""
+    axle = axle_in_body(values, table, wheel)
     free = not values[table.index[f"{wheel}.braked"]]
     spin_inertia = _spin_inertia(values, table, wheel) if free else 1.0
     mount = _vector(values, table, f"{wheel}.mount") - _vector(values, table, "center_of_mass")
-    return np.array([*mount, *(axle / length), spin_inertia, float(free)])
+    return np.array([*mount, *axle, spin_inertia, float(free)])
 
 
 def _spin_inertia(values: np.ndarray, table: VariableTable, wheel: str) -> float:

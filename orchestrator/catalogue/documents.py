@@ -21,6 +21,16 @@ def is_quantity(value: Any) -> bool:
     return isinstance(value, dict) and "value" in value
 
 
+def is_over_time(value: Any) -> bool:
+    """Whether `value` is a table that stands for an input over time: of times, or of a file."""
+    return isinstance(value, dict) and (isinstance(value.get("time"), list) or isinstance(value.get("file"), str))
+
+
+def is_whole(value: Any) -> bool:
+    """Whether `value` is a table that stands for one value or one input over time, and no table of names."""
+    return is_quantity(value) or is_over_time(value)
+
+
 @dataclass
 class Stack:
     """A document made of several: files that extend one another, then what the command line replaces.
@@ -60,7 +70,7 @@ def merged(below: Document, above: Document) -> Document:
     found = dict(below)
     for key, value in above.items():
         there = found.get(key)
-        both = isinstance(value, dict) and isinstance(there, dict) and not (is_quantity(value) or is_quantity(there))
+        both = isinstance(value, dict) and isinstance(there, dict) and not (is_whole(value) or is_whole(there))
         found[key] = merged(there, value) if both and isinstance(there, dict) else value
     return found
 
@@ -68,7 +78,7 @@ def merged(below: Document, above: Document) -> Document:
 def leaves(document: Document, prefix: str = "") -> Iterator[str]:
     """Yield the path of every value of `document`."""
     for key, value in document.items():
-        if isinstance(value, dict) and value and not is_quantity(value):
+        if isinstance(value, dict) and value and not is_whole(value):
             yield from leaves(value, f"{prefix}{key}.")
         else:
             yield prefix + key

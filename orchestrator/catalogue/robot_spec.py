@@ -33,6 +33,7 @@ Length = Annotated[Number, POSITIVE, in_unit("m")]
 Angle = Annotated[Number, POSITIVE, in_unit("rad")]
 Force = Annotated[Number, POSITIVE, in_unit("N")]
 Time = Annotated[Number, POSITIVE, in_unit("s")]
+Turn = Annotated[Number, in_unit("rad")]
 Position = Annotated[Triple, in_unit("m")]
 Direction = Annotated[Triple, in_unit("1")]
 
@@ -77,11 +78,13 @@ class Body(Strict):
 
 
 class Wheel(Strict):
-    """One wheel: where its centre is (from b, in B), its axle, and whether it is braked."""
+    """One wheel: where its centre is (from b, in B), its axle and its misalignment, and whether it is braked."""
 
     mount: Position
     braked: Annotated[Choice, SOURCED]
     axle_direction: Direction | None = None
+    axle_yaw: Turn | None = None
+    axle_tilt: Turn | None = None
     inertia: Moment | None = None
 
     def parameters(self, name: str) -> dict[str, float | bool]:
@@ -90,8 +93,10 @@ class Wheel(Strict):
         found |= _components(f"{name}.mount", self.mount.value)
         if self.axle_direction is not None:
             found |= _components(f"{name}.axle_direction", self.axle_direction.value)
-        if self.inertia is not None:
-            found[f"{name}.inertia"] = self.inertia.value
+        for key in ("axle_yaw", "axle_tilt", "inertia"):
+            quantity: Number | None = getattr(self, key)
+            if quantity is not None:
+                found[f"{name}.{key}"] = quantity.value
         return found
 
 

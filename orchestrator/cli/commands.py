@@ -16,7 +16,8 @@ import typer
 from typer.core import TyperGroup
 
 import orchestrator
-from orchestrator.cli import new, options, printing
+from orchestrator.cli import modes, new, options, printing
+from orchestrator.cli.identify import identify
 from orchestrator.cli.start import importing
 
 
@@ -67,6 +68,7 @@ app = typer.Typer(
     "2 wrong input; 3 the run failed; 130 interrupted.",
 )
 app.add_typer(new.app, name="new")
+app.command()(identify)
 
 
 def _print_version(asked: bool) -> None:
@@ -240,39 +242,13 @@ def compare(
         raise
     printing.print_comparison(done)
     pictures = "" if no_pictures else f", pictures in {done.directory}/plots"
-    print(f"verdict: {'pass' if done.passed else 'FAIL'}; results in {done.directory}{pictures}")
+    unsafe = ", but the landing is not (clearly) safe" if done.safe is False else ""
+    print(f"verdict: {'pass' if done.passed else 'FAIL'}{unsafe}; results in {done.directory}{pictures}")
     printing.complain_of(done.results)
     raise typer.Exit(done.exit_status)
 
 
-@app.command()
-def modes(
-    scenario: options.Scenario,
-    count: Annotated[int, typer.Option(help="Number of modes out of the vertical plane, and in it.")] = 6,
-    out: Annotated[Path | None, typer.Option(help="Directory for table and picture; it must not exist.")] = None,
-    set_: options.Set = None,
-) -> None:
-    """Natural frequencies of a scenario's cable.
-
-    With damping ratios and shapes, about its static equilibrium.
-    """
-    with importing():
-        from orchestrator.api import load_scenario
-        from orchestrator.landing.modes import of_scenario
-        from orchestrator.report.modes import draw
-        from orchestrator.runs.directory import claimed
-        from orchestrator.runs.modes import write_modes
-
-    loaded = load_scenario(scenario, set=set_)
-    if out is None:
-        printing.print_modes(of_scenario(loaded, count))
-        return
-    with claimed(out, loaded.name) as directory:
-        found = of_scenario(loaded, count)
-        printing.print_modes(found)
-        write_modes(directory, found)
-        draw(out)
-    print(f"table and picture in {out}")
+app.command()(modes.modes)
 
 
 @app.command()

@@ -13,8 +13,9 @@ import typer
 
 if TYPE_CHECKING:
     from orchestrator.landing.contract import Finding
-    from orchestrator.landing.limits import Limits
     from orchestrator.landing.modes import CableModes
+    from orchestrator.landing.robot_modes import SystemModes
+    from orchestrator.landing.safety import Limits
     from orchestrator.runs.compare import Comparison
     from orchestrator.runs.errors import Parts
     from orchestrator.runs.result import Run
@@ -52,14 +53,20 @@ def print_run(run: Run) -> None:
         print(f"energy drift: {run.energy.drift:.2g} J of {run.energy.exchanged:.3g} J exchanged")
 
 
-def print_safety(said: Mapping[str, Any]) -> None:
-    """Print each limit with its worst value and margin, the verdict, and what is not judged; `said` as ``summary.json``."""
+def print_safety(said: Mapping[str, Any], whose: str = "") -> None:
+    """Print each limit with its worst value and margin, the verdict, and what is not judged.
+
+    Parameters
+    ----------
+    said : as in ``summary.json``
+    whose : what it is said of, where there are several
+    """
     from orchestrator.landing.safety import HEAD, rows, why_not_judged
 
     if said.get("limits"):
         print_table(HEAD, rows(said))
     if said.get("safety"):
-        typer.secho(said["safety"], fg={True: "green", False: "red", None: "yellow"}[said["safe"]])
+        typer.secho(f"{whose}{said['safety']}", fg={True: "green", False: "red", None: "yellow"}[said["safe"]])
         for line in why_not_judged(said):
             print(f"not judged: {line}")
 
@@ -122,15 +129,15 @@ def print_comparison(comparison: Comparison) -> None:
     print_table(("master", "H [s]", "iterations", "unconverged", "cable steps", "wall [s]"), _costs(comparison))
     print("error, by the signal's range; the coupling's includes that of the inner steps")
     print_table(("master", "H [s]", "signal", "coupling", "mesh", "whole", "allowed", "verdict"), _checks(comparison))
-    _print_safeties(comparison)
     for master, orders in comparison.observed_order.items():
         shown = ", ".join(f"{name} {orders[name]:.2f}" for name in comparison.tolerance if name in orders)
         print(f"observed order, {master}: {shown}")
+    _print_safeties(comparison)
 
 
 def _print_safeties(comparison: Comparison) -> None:
     """Print whether the landing was safe by the reference, with its margins, and by each run."""
-    print_safety(comparison.reference.safety)
+    print_safety(comparison.reference.safety, "reference: ")
     for run in comparison.results:
         if run.safety:
             print(f"{run.label}: {run.safety}")
@@ -174,6 +181,22 @@ def print_modes(found: CableModes) -> None:
         for k in range(count)
     ]
     print_table(("mode", "out of plane [Hz]", "damping", "in plane [Hz]", "damping"), rows)
+
+
+def print_robot_modes(found: SystemModes, count: int) -> None:
+    """Print the first `count` modes of the line with the robot on it, and what is to be said of them."""
+    from orchestrator.landing.robot_modes import SHARES
+
+    few = found.first(count)
+    numbers = zip(few.kinds, few.frequency, few.damping_ratio, few.growth, few.shares, strict=True)
+    rows = [
+        (str(k), kind, f"{f:.5g}", f"{zeta:.3g}", f"{growth:.3g}", *(f"{abs(100.0 * share):.0f}" for share in shares))
+        for k, (kind, f, zeta, growth, shares) in enumerate(numbers, start=1)
+    ]
+    head = ("mode", "", "frequency [Hz]", "damping", "growth [1/s]", *(f"{share} [%]" for share in SHARES))
+    print_table(head, rows)
+    for warning in found.warnings:
+        complain(warning)
 
 
 def print_reproduction(found: Reproduction) -> None:

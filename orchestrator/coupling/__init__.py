@@ -8,6 +8,7 @@
 
 *FMUs*: `Fmu` is one instance, `SubStepped` one that makes several steps in each of the master's, `FmuError` its failure.
 *Graph*: `Graph` joins them, each output to an input by a `Connection`; `GraphError` says what cannot be.
+*Inputs over time*: `Course`, a table of times and values; `read_courses` has those of a CSV file; `Graph(…, inputs=…)`.
 *Masters*: `MASTERS` has them all by name; each is a class with its options as keyword arguments. A new one derives from
 `Master`, or from `Implicit` with an `Accelerator` of its own; each macro step leaves a `StepReport`.
 *Runs*: `simulate` makes a `Log`; `read_table` reads a `Table` from a file, `signal_errors` holds two of them against each
@@ -29,6 +30,7 @@ __all__ = [  # noqa: F405 (all in `api`)
     "Aitken",
     "Anderson",
     "Connection",
+    "Course",
     "FixedPoint",
     "Fmu",
     "FmuError",
@@ -50,6 +52,7 @@ __all__ = [  # noqa: F405 (all in `api`)
     "SubStepped",
     "Table",
     "observed_order",
+    "read_courses",
     "read_table",
     "signal_errors",
     "simulate",

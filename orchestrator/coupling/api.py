@@ -2,6 +2,8 @@
 
 from __future__ import annotations
 
+from orchestrator.coupling.course import Course as Course
+from orchestrator.coupling.course import read_courses as read_courses
 from orchestrator.coupling.errors import InputError as InputError
 from orchestrator.coupling.fmu.failure import FmuError as FmuError
 from orchestrator.coupling.fmu.instance import Fmu as Fmu

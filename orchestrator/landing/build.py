@@ -13,7 +13,7 @@ from orchestrator.scenario.types import LandingScenario
 if TYPE_CHECKING:
     from orchestrator.landing.monolithic import Problem
 
-NOT_NEEDED = ("initial.", ".braked", ".inertia", ".axle_direction", "integration_step", "n_wheels", "center_of_mass")
+NOT_NEEDED = ("initial.", ".braked", ".inertia", ".axle_", "integration_step", "n_wheels", "center_of_mass")
 """Robot parameters that a reference takes at their defaults where a foreign robot does not have them."""
 
 
@@ -26,7 +26,7 @@ def problem(landing: Landing | LandingScenario) -> Problem:
     cable, robot = cable_module(landing.cable), robot_module(landing.robot, landing.n_wheels)
     robot.initialize(0.0)
     contacts = [contact_module(landing.contact, s) for s in landing.placement.arc_lengths]
-    return Problem(cable, robot, contacts)
+    return Problem(cable, robot, contacts, landing.robot.courses)
 
 
 def has_monolithic(landing: Landing) -> bool:
@@ -35,6 +35,8 @@ def has_monolithic(landing: Landing) -> bool:
         return False
     known = landing.sources.variables
     tables = {"cable": Cable.table, "robot": Robot(landing.n_wheels).table}
+    if any(name not in tables["robot"].index for name in landing.robot.courses):
+        return False
     return all(_suffice(known[name], table) for name, table in tables.items())
 
 

@@ -55,6 +55,8 @@ ROBOT = (
     Point("wheel[k].moment_rate", "input", "N.m/s", False, use=ENERGY_CONJUGATE),
     _scalar("thrust", "input", "N", False, CONTROL),
     Point("torque", "input", "N.m", False, use=CONTROL),
+    _scalar("thrust_rate", "input", "N/s", False, CONTROL),
+    Point("torque_rate", "input", "N.m/s", False, use=CONTROL),
     Point("wheel[k].position", "output", "m"),
     Point("wheel[k].axle", "output", "1"),
     Point("wheel[k].velocity", "output", "m/s"),

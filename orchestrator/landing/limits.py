@@ -3,7 +3,6 @@
 from __future__ import annotations
 
 from collections.abc import Callable, Iterator, Mapping
-from dataclasses import dataclass
 
 import numpy as np
 
@@ -12,47 +11,16 @@ from orchestrator.coupling.errors import InputError
 from orchestrator.landing import workspace
 from orchestrator.landing.placement import point_at, touching_distance
 from orchestrator.landing.resolve import Landing, cable_module, contact_module, robot_module
+from orchestrator.landing.safety import UNITS, Limit, Limits
 from orchestrator.landing.workspace import Formula, NoRoom
 from orchestrator.scenario.types import LandingScenario, Provenance, Scenario
 
-UNITS = {
-    "roll": "rad", "yaw": "rad", "pitch": "rad", "z": "m", "slip": "m", "airborne": "s", "tension": "1", "wheel_force": "N",
-}  # fmt: skip
-"""Limit → its unit, in the order in which people read them."""
 SHARE_OF_STRENGTH = 0.4
 """Of the rated tensile strength: 1 over the design factor of safety of 2.5 that is usual for conductors (GB 50545)."""
 BY_CODE = (
     f"{SHARE_OF_STRENGTH} of the rated strength: a factor of safety of 2.5, as codes for overhead lines ask (GB 50545)"
 )
 NOT_GIVEN = "no limit given"
-
-
-@dataclass(frozen=True)
-class Limit:
-    """The largest value that is safe.
-
-    Attributes
-    ----------
-    value : in `unit`
-    source : where it comes from
-    formula : that it follows from; None where it is given
-    reference : what the signal is counted by: the height of touching (z, m), the rated strength (tension, N)
-    """
-
-    name: str
-    value: float
-    unit: str
-    source: str
-    formula: Formula | None = None
-    reference: float | None = None
-
-
-@dataclass(frozen=True)
-class Limits:
-    """What a landing is judged by: limits by name, and why others are not judged."""
-
-    known: Mapping[str, Limit]
-    missing: Mapping[str, str]
 
 
 def limits_of(landing: Landing) -> Limits:

@@ -18,7 +18,7 @@ from fmus.contact.module import Contact
 from fmus.kernels.roots import root
 from fmus.kernels.rotations import from_euler, rotate
 from fmus.module.variables import ModuleError
-from fmus.robot.module import Robot
+from fmus.robot.module import Robot, axle_in_body
 from orchestrator.landing.seat import Wheel, lift_to_touch, require_groove
 
 Foot = tuple[float, float, float]
@@ -59,8 +59,8 @@ def place(
     velocity : sinking speed at the start, m/s
 
     Roll is turned so that all wheels touch where there are several; other angles, and the roll of a robot with one
-    wheel, are its parameters ``initial.*``. A robot turned in yaw touches the walls of its grooves higher: no wheel
-    starts pressed into the cable.
+    wheel, are its parameters ``initial.*``. A robot turned in yaw, or a wheel whose axle is, touches the walls of its groove
+    higher: no wheel starts pressed into the cable.
 
     Raises
     ------
@@ -145,7 +145,8 @@ def _wheels(
     q, wheels = np.zeros(4), []
     from_euler(angles[0], angles[1], angles[2], q)
     for k in range(robot.n_wheels):
-        point, axle = point_at(cable, feet[k][0]), np.array(rotate(q, *_vector(robot, k, "axle_direction")))
+        point, axle_B = point_at(cable, feet[k][0]), axle_in_body(robot.values, robot.table, f"wheel[{k + 1}]")
+        axle = np.array(rotate(q, *axle_B))
         wheels.append(Wheel(k + 1, point[:3], point[3:], centres[k], axle, contact))
     return wheels
 

@@ -18,11 +18,13 @@ from fmus.module.variables import ModuleError, Value, Variable, VariableTable
 from fmus.robot.module import Robot
 from orchestrator.catalogue import modules as vocabulary
 from orchestrator.catalogue.robot_spec import RobotSpec, load_robot
+from orchestrator.coupling.course import Course
 from orchestrator.coupling.errors import InputError
 from orchestrator.coupling.fmu.instance import Fmu
 from orchestrator.landing.contract import BREAKS, check_variables
 from orchestrator.landing.mesh import Mesh, mesh_of
 from orchestrator.landing.placement import Placement, place, wheels_along
+from orchestrator.scenario.over_time import courses, held
 from orchestrator.scenario.types import LandingScenario
 
 Variables = Mapping[str, Variable]
@@ -62,12 +64,14 @@ class Part:
     steps : steps that the FMU makes in each step of the master
     settings : parameters and held inputs that the FMU is given
     module : those of our module, where it stands for the FMU
+    courses : inputs that follow a course over time
     """
 
     foreign: Path | None
     steps: int
     settings: Mapping[str, Value]
     module: Mapping[str, Value]
+    courses: Mapping[str, Course] = field(default_factory=dict)
 
 
 @dataclass(frozen=True)
@@ -183,7 +187,7 @@ def _arm(fmu: Fmu, k: int, axis: str) -> float:
 def _landing(scenario: LandingScenario, sources: Sources, placement: Placement, mesh: Mesh | None) -> Landing:
     robot, known = _robot(scenario, sources), sources.variables["robot"]
     initial = {name: value for name, value in placement.initial.items() if name in known}
-    settings = dict(scenario.robot.parameters) | initial | scenario.robot.inputs
+    settings = dict(scenario.robot.parameters) | initial | held(scenario.robot.inputs)
     robot = replace(robot, settings=settings, module=dict(robot.module) | placement.initial)
     return Landing(scenario, sources, placement, mesh, _cable(scenario, sources), robot, _contact(scenario, sources))
 
@@ -218,8 +222,9 @@ def _robot(scenario: LandingScenario, sources: Sources) -> Part:
     section, table = scenario.robot, Robot(sources.n_wheels).table
     shown = _shown(section.fmu, sources.variables["robot"], table)
     stated = sources.spec.parameters if sources.spec is not None else {}
-    module = shown | stated | section.parameters | section.inputs | dict(sources.mounts)
-    return Part(_path(section.fmu), section.steps, section.parameters | section.inputs, module)
+    constant = section.parameters | held(section.inputs)
+    module = shown | stated | constant | dict(sources.mounts)
+    return Part(_path(section.fmu), section.steps, constant, module, courses(section.inputs))
 
 
 def _contact(scenario: LandingScenario, sources: Sources) -> Part:

@@ -13,17 +13,49 @@ from orchestrator.coupling.errors import digits
 from orchestrator.coupling.run.results import Table
 from orchestrator.landing import workspace
 from orchestrator.landing.flight import SLIPPING, left_the_groove, open_wheels, time_off
-from orchestrator.landing.limits import Limit, Limits
+from orchestrator.landing.workspace import Formula
 
 Standing = Literal["kept", "unclear", "exceeded"]
 Series = dict[int | None, np.ndarray]
 """Wheel (None: the whole robot or line) → what is judged, (n,)."""
+UNITS = {
+    "roll": "rad", "yaw": "rad", "pitch": "rad", "z": "m", "slip": "m", "airborne": "s", "tension": "1", "wheel_force": "N",
+}  # fmt: skip
+"""Limit → its unit, in the order in which people read them."""
 ERRORS = {
     "roll": "robot.roll", "yaw": "robot.yaw", "pitch": "robot.pitch", "z": "robot.body.position.z",
     "wheel_force": "contact{}.normal_force_max",
 }  # fmt: skip
 """Limit → the signal whose estimated error is that of what is judged."""
 TENSIONS = ("cable.tension_left", "cable.tension_mid", "cable.tension_right")
+
+
+@dataclass(frozen=True)
+class Limit:
+    """The largest value that is safe.
+
+    Attributes
+    ----------
+    value : in `unit`
+    source : where it comes from
+    formula : that it follows from; None where it is given
+    reference : what the signal is counted by: the height of touching (z, m), the rated strength (tension, N)
+    """
+
+    name: str
+    value: float
+    unit: str
+    source: str
+    formula: Formula | None = None
+    reference: float | None = None
+
+
+@dataclass(frozen=True)
+class Limits:
+    """What a landing is judged by: limits by name, and why others are not judged."""
+
+    known: Mapping[str, Limit]
+    missing: Mapping[str, str]
 
 
 class NotRecorded(Exception):
@@ -63,7 +95,7 @@ class Judged:
     def from_content(cls, content: Mapping[str, Any]) -> Judged:
         """Return what was written; JSON has no infinity, and says null."""
         beyond = {"worst": np.inf, "margin": -np.inf, "share": np.inf}
-        return cls(**{key: beyond.get(key) if value is None else value for key, value in content.items()})
+        return cls(**{**content, **{key: value for key, value in beyond.items() if content[key] is None}})
 
 
 @dataclass(frozen=True)

@@ -55,7 +55,8 @@ def landing_graph(landing: Landing, exchange: str) -> Graph:
         possible = _possible(EXCHANGES[exchange], components)
         for fmu in _contacts(components).values():
             fmu.set_parameters({PARAMETER: possible.name})
-        return Graph(components, _kept(_connections(components), possible), order=tuple(components))
+        inputs = {f"robot.{name}": course for name, course in landing.robot.courses.items()}
+        return Graph(components, _kept(_connections(components), possible), order=tuple(components), inputs=inputs)
     except BaseException:
         for fmu in components.values():
             fmu.close()

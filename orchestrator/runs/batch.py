@@ -10,9 +10,10 @@ import os
 from collections.abc import Callable, Iterator, Sequence
 from concurrent.futures import TimeoutError as RanTooLong
 from concurrent.futures import as_completed
-from contextlib import contextmanager
+from contextlib import ExitStack, contextmanager
 from multiprocessing import get_context
 from pathlib import Path
+from typing import Any, Self
 
 from pebble import ProcessExpired, ProcessFuture, ProcessPool
 
@@ -49,17 +50,56 @@ def run_batch(
     ------
     InputError : jobs that cannot be read, all of them at once, before anything is run
     """
-    keys = _keys(jobs)
-    unique = dict(zip(keys, jobs, strict=True))
-    ready = {key: done for key, job in unique.items() if (done := found(job, store)) is not None}
-    progress(len(ready), len(unique))
-    left = {key: job for key, job in unique.items() if key not in ready}
-    if left:
-        store.mkdir(parents=True, exist_ok=True)
-        for key, done in _made(left, store, workers or _processors(), timeout):
+    with Batches(store, workers, timeout) as batches:
+        return batches.run(jobs, progress)
+
+
+class Batches:
+    """Batches one after another with the same workers, which are started with the first run that has to be made.
+
+    Parameters as for `run_batch`.
+    """
+
+    def __init__(self, store: Path, workers: int | None = None, timeout: float | None = None):
+        self.store, self.workers, self.timeout = store, workers or _processors(), timeout
+        self._open = ExitStack()
+        self._pool: ProcessPool | None = None
+
+    def __enter__(self) -> Self:
+        return self
+
+    def __exit__(self, *error: Any) -> None:
+        self._pool = None
+        self._open.__exit__(*error)
+
+    def run(self, jobs: Sequence[Job], progress: Counted = lambda done, of: None) -> list[Done]:
+        """Make those of `jobs` that the store has not, and return all in their order."""
+        keys = _keys(jobs)
+        unique = dict(zip(keys, jobs, strict=True))
+        ready = {key: done for key, job in unique.items() if (done := found(job, self.store)) is not None}
+        progress(len(ready), len(unique))
+        left = {key: job for key, job in unique.items() if key not in ready}
+        for key, done in self._made(left) if left else ():
             ready[key] = done
             progress(len(ready), len(unique))
-    return [Done(job, ready[key].directory, ready[key].failure) for key, job in zip(keys, jobs, strict=True)]
+        return [Done(job, ready[key].directory, ready[key].failure) for key, job in zip(keys, jobs, strict=True)]
+
+    def _made(self, left: dict[str, Job]) -> Iterator[tuple[str, Done]]:
+        """Yield each run of `left` as it is finished."""
+        pool, alone = self._started(), _first_of_its_kind(left)
+        for keys, limit in ((alone, None), ([key for key in left if key not in alone], self.timeout)):
+            futures = {pool.schedule(make, args=(left[key], self.store), timeout=limit): key for key in keys}
+            for future in as_completed(futures):
+                key = futures[future]
+                yield key, _ended(left[key], self.store, future)
+
+    def _started(self) -> ProcessPool:
+        """Return the workers, started if they are not yet, and kernels compiled before."""
+        if self._pool is None:
+            self.store.mkdir(parents=True, exist_ok=True)
+            compile_modules()
+            self._pool = self._open.enter_context(_pool(self.workers))
+        return self._pool
 
 
 def _keys(jobs: Sequence[Job]) -> list[str]:
@@ -78,18 +118,6 @@ def _keys(jobs: Sequence[Job]) -> list[str]:
 def _processors() -> int:
     count = getattr(os, "sched_getaffinity", None)
     return len(count(0)) if count else os.cpu_count() or 1
-
-
-def _made(left: dict[str, Job], store: Path, workers: int, timeout: float | None) -> Iterator[tuple[str, Done]]:
-    """Yield each run of `left` as it is finished."""
-    compile_modules()
-    with _pool(min(workers, len(left))) as pool:
-        alone = _first_of_its_kind(left)
-        for keys, limit in ((alone, None), ([key for key in left if key not in alone], timeout)):
-            futures = {pool.schedule(make, args=(left[key], store), timeout=limit): key for key in keys}
-            for future in as_completed(futures):
-                key = futures[future]
-                yield key, _ended(left[key], store, future)
 
 
 def _first_of_its_kind(left: dict[str, Job]) -> list[str]:

@@ -80,7 +80,7 @@ def safety(coupled: Coupled) -> dict[str, Any]:
     error = coupled.log.error
     errors = coupled.estimated_error | {f"{i['contact']}.normal_force_max": np.inf for i in unresolved(coupled)}
     found = coupled.system.safety(coupled.table, coupled.fields, errors, None if error is None else str(error))
-    return found.content() if found is not None else NO_LANDING
+    return found.content() if found is not None else dict(NO_LANDING)
 
 
 def _cost(coupled: Coupled) -> dict[str, Any]:

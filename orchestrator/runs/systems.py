@@ -2,7 +2,7 @@
 
 from __future__ import annotations
 
-from collections.abc import Callable, Iterable, Mapping, Sequence
+from collections.abc import Callable, Iterable, Iterator, Mapping, Sequence
 from dataclasses import dataclass, replace
 from functools import cached_property
 from pathlib import Path
@@ -13,14 +13,17 @@ import numpy as np
 from fmus.cable.mesh import TOLERANCE
 from orchestrator.catalogue import library
 from orchestrator.catalogue import modules as vocabulary
+from orchestrator.coupling.course import Course
 from orchestrator.coupling.exchange import (
     EXCHANGES,
     PARAMETER,
+    RATE,
     Choice,
     exchange_named,
     is_companion,
     is_rate_of_motion,
     stems,
+    suffixed,
     suited_to,
 )
 from orchestrator.coupling.fmu.instance import Fmu
@@ -35,11 +38,12 @@ from orchestrator.landing.build import has_monolithic, problem
 from orchestrator.landing.contract import is_control, is_unused
 from orchestrator.landing.fields import cable_fields
 from orchestrator.landing.impacts import Impact, impacts
-from orchestrator.landing.limits import Limits, limits_of
+from orchestrator.landing.limits import limits_of
 from orchestrator.landing.resolve import MESH_KEYS, MESH_TOLERANCE, Landing, Variables
 from orchestrator.landing.resolve import resolve as resolve_landing
-from orchestrator.landing.safety import Safety, judge
+from orchestrator.landing.safety import Limits, Safety, judge
 from orchestrator.landing.wiring import inner_step, lacking, landing_graph
+from orchestrator.scenario.over_time import courses, held
 from orchestrator.scenario.types import CableSection, Component, GraphScenario, LandingScenario, RobotSection, Scenario
 
 if TYPE_CHECKING:
@@ -160,7 +164,8 @@ class LandingSystem:
         names = [n for n in graph.unfed if owner_of(n) in named and not is_unused(variable_of(n), len(contacts))]
         lacks = zip(contacts, lacking(graph.components), strict=True)
         fallen = [_fallen_back(name, graph.components[name], self.exchange, what) for name, what in lacks]
-        return [*filter(None, fallen), *_unfed([n for n in names if not is_control(variable_of(n))])]
+        unfed = _unfed([n for n in names if not is_control(variable_of(n))])
+        return [*filter(None, fallen), *unfed, *_means_alone(graph)]
 
     def problem(self) -> Callable[[], Problem] | None:
         """Return what makes the monolithic problem; None where our modules cannot stand for a foreign FMU."""
@@ -252,8 +257,9 @@ class GraphSystem:
             supply = Supply(components, connections)
             for name, section in self.scenario.components.items():
                 own = self._own_exchange(name, supply) if self._follows(name) else {}
-                components[name].set_parameters({**own, **section.parameters, **section.inputs})
-            return Graph(components, _kept(connections, components))
+                components[name].set_parameters({**own, **section.parameters, **held(section.inputs)})
+            inputs = {f"{name}.{key}": course for name, key, course in self._courses()}
+            return Graph(components, _kept(connections, components), inputs=inputs)
         except BaseException:
             for fmu in components.values():
                 fmu.close()
@@ -267,7 +273,13 @@ class GraphSystem:
             for name, fmu in graph.components.items()
             if self._follows(name)
         ]
-        return [*filter(None, fallen), *_unfed(graph.unfed)]
+        return [*filter(None, fallen), *_unfed(graph.unfed), *_means_alone(graph)]
+
+    def _courses(self) -> Iterator[tuple[str, str, Course]]:
+        """Yield component, input and course of the inputs over time."""
+        for name, section in self.scenario.components.items():
+            for key, course in courses(section.inputs).items():
+                yield name, key, course
 
     def _follows(self, name: str) -> bool:
         """Return whether a component is one of our modules that has the exchange as a parameter, and is left to choose."""
@@ -352,6 +364,13 @@ def _fallen_back(name: str, fmu: Fmu, asked: str, lacks: Missing) -> str:
 def _unfed(names: Sequence[str]) -> list[str]:
     """Return the line that lists inputs which nothing feeds, x, y, z together; none if there is none."""
     return [f"inputs that nothing feeds keep their start values: {', '.join(stems(names))}"] if names else []
+
+
+def _means_alone(graph: Graph) -> list[str]:
+    """Return a line for each component that is told of an input over time the means over its steps alone."""
+    driven = {name: fmu.driven.without_slope for name, fmu in graph.components.items() if fmu.driven is not None}
+    what = "given as the mean over each macro step, without slope: the FMU has no input"
+    return [f"{n}: {', '.join(stems(ins))} {what} {suffixed(ins[0], RATE)}" for n, ins in driven.items() if ins]
 
 
 def _scaled(section: Stepped, known: Variables, ratio: float) -> Stepped:

@@ -16,6 +16,7 @@ from orchestrator.catalogue.documents import Document
 from orchestrator.catalogue.quantities import Complaint, Scalar
 from orchestrator.coupling.errors import InputError, digits, nearest
 from orchestrator.coupling.masters.options import master_options, out_of_bounds
+from orchestrator.scenario.over_time import OverTime, problems_of
 from orchestrator.scenario.types import DEFAULT_MASTER, UNITS, Provenance
 
 Known = Mapping[str, Mapping[str, Variable]]
@@ -74,12 +75,15 @@ def to_si(document: Document, known: Known, provenance: dict[str, Provenance], p
             continue
         try:
             document[key] = _converted(value, given, wanted)
-            provenance[path] = replace(provenance[path], written=f"{value} {given}")
+            shown = f"{len(value.time)} values in" if isinstance(value, OverTime) else value
+            provenance[path] = replace(provenance[path], written=provenance[path].written or f"{shown} {given}")
         except UnitError as error:
             yield Complaint(path, str(error))
 
 
 def _converted(value: Any, given: str, wanted: str) -> Any:
+    if isinstance(value, OverTime):
+        return value.converted(given, wanted)
     if isinstance(value, int | float) and not isinstance(value, bool):
         return convert(value, given, wanted)
     raise UnitError(f"{value!r} is no number and has no unit")
@@ -123,6 +127,8 @@ def _section_problems(path: str, section: Document, known: Mapping[str, Variable
 
 
 def _value_problems(path: str, variable: Variable, value: Any) -> Iterator[Complaint]:
+    if isinstance(value, OverTime):
+        yield from problems_of(path, variable, value)
     if not isinstance(value, Scalar):
         return  # the types have said so
     wanted = {"real": (int, float), "integer": int, "boolean": bool, "string": str}[variable.kind]

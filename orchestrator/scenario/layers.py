@@ -9,7 +9,7 @@ from pathlib import Path
 from typing import Any
 
 from orchestrator.catalogue import robot_spec
-from orchestrator.catalogue.documents import Document, Stack, chain, is_quantity, leaves
+from orchestrator.catalogue.documents import Document, Stack, chain, is_over_time, is_quantity, is_whole, leaves
 from orchestrator.catalogue.scenarios import find
 from orchestrator.coupling.errors import InputError
 from orchestrator.coupling.masters.options import master_options
@@ -125,14 +125,14 @@ def named_tables(document: Document) -> Document:
 
 def _flat(table: Document, prefix: str = "") -> Iterator[tuple[str, Any]]:
     for key, value in table.items():
-        if isinstance(value, dict) and "value" not in value:
+        if isinstance(value, dict) and not is_whole(value):
             yield from _flat(value, f"{prefix}{key}.")
         else:
             yield prefix + key, value
 
 
 def resolve_paths(document: Document, folder: Path) -> None:
-    """Make the paths of FMUs, robots' and conductors' files absolute; they are relative to the file in which they stand."""
+    """Make the paths of FMUs, of robots' and conductors' files and of tables absolute; they are relative to their file."""
     for place in _sections(document):
         section = _table(document, place) or {}
         for key in ("fmu", "model", "conductor"):
@@ -140,6 +140,9 @@ def resolve_paths(document: Document, folder: Path) -> None:
             if isinstance(text, str) and (key == "fmu" or robot_spec.is_file(text)):
                 path = str((folder / text).absolute())
                 section[key] = section[key] | {"value": path} if is_quantity(section[key]) else path
+        for name, value in (_table(section, ("inputs",)) or {}).items():
+            if is_over_time(value) and isinstance(value.get("file"), str):
+                section["inputs"][name] = value | {"file": str((folder / value["file"]).absolute())}
 
 
 # -- options of a command ----------------------------------------------------------------------------------------

@@ -10,7 +10,7 @@ from pathlib import Path
 from pydantic import ValidationError
 
 from orchestrator.catalogue import robot_spec
-from orchestrator.catalogue.documents import Document, Stack, is_quantity
+from orchestrator.catalogue.documents import Document, Stack, is_over_time, is_quantity
 from orchestrator.catalogue.quantities import Complaint, complaints, quantity_complaints
 from orchestrator.catalogue.scenarios import find
 from orchestrator.coupling.errors import InputError
@@ -19,6 +19,7 @@ from orchestrator.scenario.check import check, known_variables, to_si
 from orchestrator.scenario.conductor import fill_line
 from orchestrator.scenario.contact_set import fill_in
 from orchestrator.scenario.inertia import scale_inertia
+from orchestrator.scenario.over_time import parse
 from orchestrator.scenario.types import GraphScenario, LandingScenario, Provenance, Scenario
 
 LANDING_KEYS = ("cable", "robot", "contact", "landing")
@@ -47,6 +48,7 @@ def load(
     if master is not None:
         layers.replace_master(stack, master)
     notes += layers.override(stack, overrides)
+    layers.resolve_paths(stack.document, path.parent)
     problems: list[Complaint] = fill_in(stack)
     provenance: dict[str, Provenance] = {}
     plain = _unwrap(stack, stack.document, "", provenance, problems)
@@ -71,6 +73,14 @@ def _unwrap(
     plain: Document = {}
     for key, value in table.items():
         path = prefix + key
+        if is_over_time(value):
+            parsed = parse(path, value)
+            problems += parsed.problems
+            found[path] = replace(
+                _provenance(value, stack.place_of(path)), written=parsed.written, sha256=parsed.sha256
+            )
+            plain |= {key: parsed.value} if parsed.value is not None else {}
+            continue
         if isinstance(value, dict) and not is_quantity(value):
             plain[key] = _unwrap(stack, value, f"{path}.", found, problems)
             continue

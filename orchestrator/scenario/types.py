@@ -24,6 +24,7 @@ from pydantic import (
 from fmus.module import registry
 from orchestrator.catalogue.quantities import Scalar
 from orchestrator.coupling.exchange import Choice
+from orchestrator.scenario.over_time import as_input
 
 DEFAULT_MASTER = "iqn_ils"
 
@@ -45,6 +46,7 @@ def _scalar(value: Any) -> Scalar:
 
 
 Settings = dict[str, Annotated[Any, AfterValidator(_scalar)]]
+Inputs = dict[str, Annotated[Any, AfterValidator(as_input)]]
 Positive = Annotated[float, Field(gt=0.0)]
 Count = Annotated[int, Field(ge=1)]
 NonNegative = Annotated[float, Field(ge=0.0)]
@@ -91,14 +93,14 @@ class CableSection(Section):
 class RobotSection(Section):
     """The robot: one of the catalogue or a TOML file like those there (`model`), or any FMU of the contract (`fmu`).
 
-    `inputs` are held over the whole run: thrust, control torque, drive torques of the wheels.
+    `inputs`: thrust, control torque, drive torques of the wheels; held over the whole run, or over time.
     """
 
     model: str | None = None
     fmu: str | None = None
     steps: Count = 1
     parameters: Settings = {}
-    inputs: Settings = {}
+    inputs: Inputs = {}
 
     @model_validator(mode="after")
     def _one_robot(self) -> RobotSection:
@@ -187,7 +189,7 @@ class Component(Section):
     fmu: str | None = None
     steps: Count = 1
     parameters: Settings = {}
-    inputs: Settings = {}
+    inputs: Inputs = {}
 
     @model_validator(mode="after")
     def _one_source(self) -> Component:

@@ -95,7 +95,7 @@ def jobs_of(documents: Documents, claims: Iterable[Claim]) -> dict[Key, Job]:
     """Return the runs that `claims` need, by landing and set."""
     names = dict.fromkeys(name for claim in claims for name in claim.landings)
     return {
-        (name, parameter_set): _job(documents, documents.landings.landings[name], parameter_set)
+        (name, parameter_set): job_of(documents, documents.landings.landings[name], parameter_set)
         for name in names
         for parameter_set in documents.landings.landings[name].sets or documents.landings.sets
     }
@@ -111,7 +111,7 @@ def jobs_of_sensitivity(documents: Documents, landing: str) -> dict[Key, Job]:
     """Return two runs of `landing` with the judged set for each number assumed: at its lower and its upper bound."""
     base, judge = documents.landings.landings[landing], documents.claims.judged_by
     return {
-        (assumed.name, end): _job(documents, base, judge, {assumed.key: value}, estimate=False)
+        (assumed.name, end): job_of(documents, base, judge, {assumed.key: value}, estimate=False)
         for assumed in documents.landings.assumed
         for end, value in (("low", assumed.low), ("high", assumed.high))
     }
@@ -120,10 +120,10 @@ def jobs_of_sensitivity(documents: Documents, landing: str) -> dict[Key, Job]:
 def _variant(documents: Documents, series: Series, variant: Variant) -> Job:
     landing = documents.landings.landings[variant.landing or series.landing]
     parameter_set = variant.parameter_set or series.parameter_set
-    return _job(documents, landing, parameter_set, variant.set, variant.interval, estimate=False)
+    return job_of(documents, landing, parameter_set, variant.set, variant.interval, estimate=False)
 
 
-def _job(
+def job_of(
     documents: Documents,
     landing: Landing,
     parameter_set: str,

@@ -18,6 +18,7 @@ from typing import Any, Self
 import fmpy
 import numpy as np
 
+from orchestrator.coupling.course import Course
 from orchestrator.coupling.errors import FORWARD, digits, nearest
 from orchestrator.coupling.exchange import PARAMETER
 from orchestrator.coupling.fmu.binding import (
@@ -32,6 +33,7 @@ from orchestrator.coupling.fmu.binding import (
     finalize_python,
 )
 from orchestrator.coupling.fmu.description import Port, Value, capabilities_of, ports_of, read_description
+from orchestrator.coupling.fmu.driven import Driven
 from orchestrator.coupling.fmu.failure import NOT_FINITE, FmuError
 from orchestrator.coupling.fmu.group import Group
 from orchestrator.coupling.fmu.python_modules import own_modules
@@ -65,6 +67,7 @@ class Fmu:
         unit is that of X per second, or if it is declared to be the slope of X
     log : messages of the FMU
     parameters : what `set_parameters` was given
+    driven : the inputs that follow courses over time, if any
     solves, wall : steps made and the seconds spent in them
     time, stop : s, start of the last step; where the run ends, nan where nobody says it
     busy_since : clock at which the running call began, 0 when none runs
@@ -81,6 +84,7 @@ class Fmu:
         self.capabilities = capabilities_of(self.description)
         self.log: list[str] = []
         self.parameters: dict[str, Value] = {}
+        self.driven: Driven | None = None
         self.solves, self.wall, self.time, self.busy_since = 0, 0.0, 0.0, 0.0
         self.stop = np.nan
         self.worst, self.initialized = 0, False
@@ -156,6 +160,16 @@ class Fmu:
             self._set_one(port, value)
         self.parameters |= values
 
+    def follow(self, courses: Mapping[str, Course], taken: Iterable[str] = ()) -> None:
+        """Let inputs follow `courses` over time: each step is given their means, and slopes where there are inputs for them.
+
+        Parameters
+        ----------
+        courses : input → its course
+        taken : other inputs that are set from elsewhere, by a connection for instance
+        """
+        self.driven = Driven(self, courses, {*self.parameters, *taken}) if courses else None
+
     @property
     def exchange(self) -> str:
         """What the FMU assumes of the motion inside a step (`held`, `point`, …), empty if it has no such parameter."""
@@ -166,6 +180,8 @@ class Fmu:
         """Return a second instance with the same parameters, not initialised."""
         twin = Fmu(self.path, self.name)
         twin.set_parameters(self.parameters)
+        if self.driven is not None:
+            twin.follow(self.driven.courses, self.driven.taken)
         return twin
 
     def _set_one(self, port: Port, value: Value) -> None:
@@ -215,6 +231,8 @@ class Fmu:
         self._require_open()
         self.time, self.stop = start, np.nan if stop is None else stop
         self._call("initialisation", self.fmi.enter_initialization, start, stop)
+        if self.driven is not None:
+            self.driven.set_instant(start)
 
     def exit_initialization(self) -> None:
         """Leave initialisation mode."""
@@ -234,12 +252,16 @@ class Fmu:
             h = self.stop - t
         self.time = t
         self.solves += 1
+        if self.driven is not None:
+            self.driven.set_step(t, h)
         self.busy_since = clock = perf_counter()
         status = self.fmi.do_step(t, h)
         self.wall += perf_counter() - clock
         self.busy_since = 0.0
         if status > WARNING:
             raise self.error(status, f"the step of {digits(h)} s", "" if self.capabilities.variable_step else FIXED)
+        if self.driven is not None and self.driven.shown:
+            self.driven.set_instant(t + h)
 
     def allows(self, h: float, H: float) -> bool:
         """Return whether steps `h` can be made where the master's own are `H`, s."""

@@ -108,6 +108,8 @@ class SubStepped(Fmu):
         """Return a second instance with the same parameters, not initialised."""
         twin = SubStepped(self.path, self.name, self.steps)
         twin.set_parameters(self.parameters)
+        if self.driven is not None:
+            twin.follow(self.driven.courses, self.driven.taken)
         return twin
 
     def exit_initialization(self) -> None:

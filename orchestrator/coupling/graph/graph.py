@@ -12,6 +12,7 @@ from typing import Any, Protocol, Self
 
 import numpy as np
 
+from orchestrator.coupling.course import Course
 from orchestrator.coupling.fmu.binding import SavedState
 from orchestrator.coupling.fmu.failure import FmuError
 from orchestrator.coupling.fmu.instance import Fmu
@@ -19,7 +20,7 @@ from orchestrator.coupling.graph.arrays import Arrays, Node
 from orchestrator.coupling.graph.links import Connection, GraphError, checked_links
 from orchestrator.coupling.graph.loops import AlgebraicLoop
 from orchestrator.coupling.graph.order import Dependencies, dependencies_of, derived_order, levels
-from orchestrator.coupling.graph.supply import require_supplied, unfed
+from orchestrator.coupling.graph.supply import follow, require_supplied, unfed
 
 
 class Observer(Protocol):
@@ -46,6 +47,7 @@ class Graph(Arrays):
     connections : from outputs to inputs; a text is read as ``component.output -> component.input``
     order : Gauss–Seidel order; None derives it: along the connections, inside a loop components with
         feedthrough after those that feed them
+    inputs : inputs that follow a course over time, ``component.input``
 
     Attributes
     ----------
@@ -66,11 +68,13 @@ class Graph(Arrays):
         components: Mapping[str, Fmu],
         connections: Iterable[Connection | str],
         order: Sequence[str] | None = None,
+        inputs: Mapping[str, Course] | None = None,
     ):
         _name(components)
         self.connections = tuple(Connection.parse(c) if isinstance(c, str) else c for c in connections)
         links = checked_links(components, self.connections)
         require_supplied(components, self.connections)
+        follow(components, self.connections, inputs or {})
         self.feedthrough = dependencies_of(components, initial=False)
         self.order = (
             derived_order(components, links, self.feedthrough) if order is None else _checked_order(order, components)
@@ -79,6 +83,8 @@ class Graph(Arrays):
         self.observers: list[Observer] = []
         for node in self.nodes:
             node.feedthrough = self._has_feedthrough(node)
+            if node.fmu.driven is not None:
+                node.fmu.driven.shown = self._depends(node, node.fmu.driven.courses)
         self.stages, _ = self._stages(self.feedthrough)
         read_late = {node.name for stage in self.stages[1:] for node in stage}
         # outputs that feed nothing may depend on inputs too, and are recorded
@@ -101,7 +107,11 @@ class Graph(Arrays):
     # -- outputs at a fixed time ----------------------------------------------------------------------------
 
     def _has_feedthrough(self, node: Node) -> bool:
-        fed = {node.fmu.ports[name].variable for name in node.inputs.names}
+        return self._depends(node, node.inputs.names)
+
+    def _depends(self, node: Node, inputs: Iterable[str]) -> bool:
+        """Return whether an output of a component depends on one of its `inputs` without a step."""
+        fed = {node.fmu.ports[name].variable for name in inputs}
         return any(deps is None or deps & fed for deps in self.feedthrough[node.name].values())
 
     def _stages(self, dependencies: Dependencies) -> tuple[list[list[Node]], np.ndarray]:

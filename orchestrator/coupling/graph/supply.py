@@ -5,6 +5,8 @@ from __future__ import annotations
 from collections.abc import Iterable, Mapping
 from dataclasses import dataclass
 
+from orchestrator.coupling.course import Course
+from orchestrator.coupling.errors import nearest
 from orchestrator.coupling.exchange import (
     EXCHANGES,
     MEAN,
@@ -98,6 +100,24 @@ def require_supplied(components: Mapping[str, Fmu], connections: Iterable[Connec
             )
 
 
+def follow(components: Mapping[str, Fmu], connections: Iterable[Connection], inputs: Mapping[str, Course]) -> None:
+    """Let inputs, ``component.input``, follow their courses; `GraphError` says which cannot."""
+    feeds = {c.target: c.source for c in connections}
+    courses: dict[str, dict[str, Course]] = {}
+    for signal, course in inputs.items():
+        name = owner_of(signal)
+        if name not in components:
+            raise GraphError(f"inputs: {signal}: no component {name!r}{nearest(name, components)}")
+        if signal in feeds:
+            raise GraphError(f"inputs: {signal} follows a table and is fed by {feeds[signal]}; drop one of the two")
+        courses.setdefault(name, {})[variable_of(signal)] = course
+    for name, own in courses.items():
+        try:
+            components[name].follow(own, [variable_of(s) for s in feeds if owner_of(s) == name])
+        except ValueError as error:
+            raise GraphError(f"inputs: {error}") from None
+
+
 def chosen(wanted: str, choices: Iterable[str], lacks: Missing) -> str:
     """Return `wanted`, or the next best exchange among `choices` for a component that `lacks` something; empty: its own."""
     row, offered = lacks.best(EXCHANGES[wanted]), set(choices)
@@ -120,6 +140,7 @@ def unfed(components: Mapping[str, Fmu], fed: Iterable[str], made: Iterable[str]
         for n, port in fmu.ports.items()
         if port.causality == "input" and port.kind == "real" and port.variability != "discrete"
         and f"{name}.{n}" not in served and n not in fmu.parameters and not _is_idle(name, n, fmu, served)
+        and not (fmu.driven is not None and fmu.driven.sets(n))
     ]  # fmt: skip
 
 

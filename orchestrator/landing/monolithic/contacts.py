@@ -52,15 +52,17 @@ def walls(system, robot, points, contacts, outs, space):
 
 
 @kernel
-def loads(system, robot, points, slips, contacts, outs, generalized, space):
+def loads(system, control, robot, points, slips, contacts, outs, generalized, space):
     """Add friction, and write the generalised forces on the cable points and the robot's accelerations.
+
+    `control` are the control loads at this instant.
 
     A contact that has left the groove acts no more.
     """
     n_wheels = system.contacts.shape[0]
     motion = space.motion
     for i in range(space.loads.size):
-        space.loads[i] = system.control[i]
+        space.loads[i] = control[i]
     for k in range(n_wheels):
         for i in range(at.WHEEL):
             motion[i] = points[k, i]
@@ -141,7 +143,8 @@ def settle(system, state, move, space, work):
     found = walls(system, state.robot, space.cable_point, state.contacts, space.out[0], space)
     if found != OK:
         return found
-    loads(system, state.robot, space.cable_point, space.trial, state.contacts, space.out[0], space.generalized, space)
+    control, out = space.control[1], space.out[0]
+    loads(system, control, state.robot, space.cable_point, space.trial, state.contacts, out, space.generalized, space)
     if move:
         for k in range(arcs.size):
             state.contacts[k, REGIME] = _regime(system.contacts[k], space.out[0, k])

@@ -17,8 +17,17 @@ WANTED, LONGEST, ALLOWED, EVENT, NEWTON, MATRIX, STEPS, ITERATIONS, REJECTED = r
 
 
 @kernel
+def set_control(system, since, h, space):
+    """Write the control loads at the stages of a step `h` that begins `since` (s) after the start of `advance`."""
+    for j in range(2):
+        at = since + system.method.c[j] * h
+        for i in range(system.control.shape[1]):
+            space.control[j, i] = system.control[0, i] + system.control[1, i] * at
+
+
+@kernel
 def advance(system, state, control, t, end, space, work):
-    """Integrate from `t` to `end` with controlled steps.
+    """Integrate from `t` to `end` with controlled steps; in between the control loads are straight.
 
     Parameters
     ----------
@@ -30,11 +39,13 @@ def advance(system, state, control, t, end, space, work):
     status : OK, OFF_CABLE, or why no step is short enough: NOT_CONVERGED, CONTACT_FAILED, AXLE_ALONG
     t : time reached
     """
+    start = t
     while end - t > 1e-12 * max(1.0, end):
         left = end - t
         longest = min(control[WANTED], control[LONGEST], longest_step(system, state, space))
         h = left / max(1.0, np.ceil(left / longest - 1e-9))
         fresh = abs(h - control[MATRIX]) > 1e-9 * h
+        set_control(system, t - start, h, space)
         status, error, iterations = step(
             system, state, h, control[NEWTON], fresh, space, work, control[ALLOWED], control[EVENT]
         )

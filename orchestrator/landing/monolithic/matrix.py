@@ -57,7 +57,8 @@ def _interface_tangent(system, robot, points, slips, contacts, space):
         for i in range(2):
             base_slip[k, i] = outs[k, at.SLIP_VELOCITY + i]
             space.trial[k, i] = slips[k, i]
-    loads(system, robot, points, space.trial, contacts, outs, base, space)
+    control = space.control[1]
+    loads(system, control, robot, points, space.trial, contacts, outs, base, space)
     for rate in (True, False):
         step = RATE_STEP if rate else STEP
         for column in range(value.size):
@@ -72,7 +73,7 @@ def _interface_tangent(system, robot, points, slips, contacts, space):
                         space.trial[k, i] = slips[k, i]
                     else:
                         space.trial[k, i] = slips[k, i] + step * space.dslip[k, i, column]
-            loads(system, space.probe, space.probe_point, space.trial, contacts, outs, value, space)
+            loads(system, control, space.probe, space.probe_point, space.trial, contacts, outs, value, space)
             target = space.dv if rate else space.dy
             for i in range(value.size):
                 target[i, column] = (value[i] - base[i]) / step

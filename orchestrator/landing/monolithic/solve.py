@@ -3,8 +3,9 @@
 from __future__ import annotations
 
 import time as clock
-from collections.abc import Callable, Sequence
+from collections.abc import Callable, Mapping, Sequence
 from dataclasses import dataclass, field
+from itertools import pairwise
 
 import numpy as np
 
@@ -20,9 +21,11 @@ from fmus.module.variables import ModuleError
 from fmus.robot import dynamics
 from fmus.robot import rigid_body as rb
 from fmus.robot.module import Robot, body_parameters, initial_state
+from orchestrator.coupling.course import Course
 from orchestrator.coupling.exchange import only_couples
 from orchestrator.landing.monolithic import control as steps
 from orchestrator.landing.monolithic.contacts import face, settle
+from orchestrator.landing.monolithic.control_loads import ControlLoads
 from orchestrator.landing.monolithic.looks import begin, restart
 from orchestrator.landing.monolithic.state import (
     ARC,
@@ -57,11 +60,15 @@ NEWTON = 1e-12
 
 @dataclass
 class Problem:
-    """Initialised modules that make one system; one contact a wheel, in the order of the wheels."""
+    """Initialised modules that make one system; one contact a wheel, in the order of the wheels.
+
+    `courses`: inputs of the robot that follow a course over time; the others keep their values.
+    """
 
     cable: Cable
     robot: Robot
     contacts: list[Contact]
+    courses: Mapping[str, Course] = field(default_factory=dict)
 
 
 @dataclass
@@ -102,7 +109,8 @@ class Integrator:
         n_wheels = len(problem.contacts)
         prm = body_parameters(robot.values, robot.table)
         contacts = np.stack([law_parameters(c.values, c.table) for c in problem.contacts])
-        self.system = System(cable.model, self.method, prm, contacts, _control(robot, n_wheels))
+        self.loads = ControlLoads(robot, problem.courses)
+        self.system = System(cable.model, self.method, prm, contacts, self.loads.values)
         memory = np.zeros((n_wheels, N_CONTACT))
         memory[:, ARC] = [c.values[c.table.index["initial.s"]] for c in problem.contacts]
         start = initial_state(robot.values, robot.table)
@@ -126,7 +134,18 @@ class Integrator:
         return int(self.control[steps.STEPS])
 
     def advance(self, t: float, end: float) -> None:
-        """Integrate from `t` to `end` with controlled steps; raises `ModuleError` if none is short enough."""
+        """Integrate from `t` to `end` with controlled steps, which end where the course of an input has a kink.
+
+        Raises
+        ------
+        ModuleError : no step is short enough
+        """
+        for first, last in pairwise([t, *self.loads.kinks(t, end), end]):
+            self.loads.set(first, last)
+            self._advance(first, last)
+
+    def _advance(self, t: float, end: float) -> None:
+        """Integrate over a time in which the control loads are straight."""
         parts = self.refinement * max(1.0, np.ceil((end - t) / (self.refinement * self.longest) - 1e-9))
         self.control[steps.LONGEST] = (end - t) / parts
         status, reached = steps.advance(self.system, self.state, self.control, t, end, self.space, self.work)
@@ -163,17 +182,6 @@ def _contact_signals(out: np.ndarray, memory: np.ndarray) -> tuple[float, ...]:
         0.0 if memory[GONE] else out[at.LATERAL],
         *memory[NORMAL_MAX : TOUCH_TIME + 1],
     )
-
-
-def _control(robot: Robot, n_wheels: int) -> np.ndarray:
-    """Return thrust, torque and drive torques, constant inputs of the robot, in the places of the kernels' loads."""
-    value = {name: float(robot.values[robot.table.index[name]]) for name in robot.table.names("input")}
-    loads = np.zeros(rb.BODY_LOADS + rb.WHEEL_LOADS * n_wheels)
-    loads[rb.THRUST] = value["thrust"]
-    loads[rb.TORQUE : rb.BODY_LOADS] = value["torque.x"], value["torque.y"], value["torque.z"]
-    for k in range(n_wheels):
-        loads[rb.BODY_LOADS + rb.WHEEL_LOADS * k + rb.DRIVE] = value[f"wheel[{k + 1}].drive_torque"]
-    return loads
 
 
 class _Recorder:

@@ -37,7 +37,8 @@ class System(NamedTuple):
     ----------
     robot : (56,) of `fmus.robot.rigid_body`
     contacts : (n_wheels, 18) of `fmus.contact.law`
-    control : (4 + 7 n_wheels,) thrust, torque and drive torques in the places of `rigid_body.resultants`
+    control : (2, 4 + 7 n_wheels) thrust, torque and drive torques in the places of `rigid_body.resultants`, and their rates;
+        at the start of the present call of `advance`
     """
 
     model: Model
@@ -69,6 +70,7 @@ class Space(NamedTuple):
     cable_point: np.ndarray  # (n_wheels, 12) p, t, dp, dt
     motion: np.ndarray  # (24,)
     out: np.ndarray  # (2, n_wheels, 34) results of the law
+    control: np.ndarray  # (2, 4 + 7 n_wheels) control loads at the stages
     generalized: np.ndarray  # (m,) generalised forces on (p, t) of each wheel, accelerations of the robot
     reference: np.ndarray  # (m,)
     dy: np.ndarray  # (m, m) derivatives by coordinates
@@ -106,6 +108,7 @@ def make_space(n: int, n_wheels: int) -> Space:
         cable_point=z((n_wheels, at.WHEEL)),
         motion=z(at.MOTION_SIZE),
         out=z((2, n_wheels, at.OUT_SIZE)),
+        control=z((2, rb.BODY_LOADS + rb.WHEEL_LOADS * n_wheels)),
         generalized=z(m),
         reference=z(m),
         dy=z((m, m)),

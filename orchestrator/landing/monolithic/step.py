@@ -146,8 +146,8 @@ def _residuals(system, state, h, space, work):
                 path = to_stage(method, j, space.slip[0, k, i], space.slip[1, k, i])
                 space.trial[k, i] = state.contacts[k, BRISTLE + i] + h * path
         contacts.cable_points(system, work.q[j], work.v[j], space.arc[j], points, work.shape)
-        forces, out = space.generalized, space.out[j]
-        contacts.loads(system, space.stage[j], points, space.trial, state.contacts, out, forces, space)
+        forces, out, control = space.generalized, space.out[j], space.control[j]
+        contacts.loads(system, control, space.stage[j], points, space.trial, state.contacts, out, forces, space)
         _external(model, space.arc[j], forces, work)
         force = work.residual[j]
         material, mass, drag = residual(model, work.q[j], work.v[j], work.a[j], work.external, force, work.element)
@@ -201,7 +201,7 @@ def _accept(system, state, h, space, work):
         state.cable[4 * n + DISSIPATED + i] += h * power
     state.cable[4 * n + LAST_INNER] = h
     for j in range(2):
-        power = rb.control_power(system.robot, space.stage[j], system.control)
+        power = rb.control_power(system.robot, space.stage[j], space.control[j])
         state.control_work[0] += h * method.b[j] * power
         for i in range(N_ROBOT):
             state.accelerations[j, i] = space.b[j, i]
