@@ -154,6 +154,7 @@ def test_bands_ranges_units_and_senses():
     assert verdict(claim(paper=0.5, sense="at most"))[0] == "not met"
     assert verdict(claim(paper=[1.0, 1.0], measure="band", landings=["here", "here"], take="range"))[0] == "not met"
     assert verdict(claim(paper=0.96, tolerance=0.0, relative=0.05))[0] == "met"
+    assert verdict(claim(paper=1.0, landings=["here", "here"], take="where", tolerance=0.0))[0] == "met"
 
 
 def test_parts_are_met_if_all_are():

@@ -64,7 +64,7 @@ class Book:
             if table is None or name is None or claim.signal is None:
                 return None
             found += measured(table, name, claim.signal, claim.unit)
-        return [min(found), max(found)] if claim.take == "range" else found
+        return taken(found, claim.take)
 
     def ours(self, claim: Claim) -> dict[str, list[float]]:
         """Return ours by set, in the claim's unit; of a formula under the name of no set."""
@@ -80,6 +80,17 @@ class Book:
             return None
         errors = [done.summary.get("estimated_error", {}).get(claim.signal) for done in runs if done is not None]
         return None if None in errors else max(errors) * TO_UNIT.get(claim.unit, 1.0)
+
+
+def taken(found: list[float], take: str) -> list[float]:
+    """Return what a claim takes of the values of its landings: see `Claim.take`."""
+    match take:
+        case "range":
+            return [min(found), max(found)]
+        case "where":
+            return [1.0 + int(np.argmax(np.abs(found)))]
+        case _:
+            return found
 
 
 def measured(table: Table, measure: str, name: str, unit: str = "1") -> list[float]:

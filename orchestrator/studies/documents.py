@@ -99,7 +99,7 @@ class Claim(Section):
     ----------
     paper : value, or several, in `unit`
     measure, signal, landings : a key of `MEASURES`, of which signal, in which landings
-    take : of several landings: ``each``, or the ``range`` of all
+    take : of several landings: ``each``, the ``range`` of all, or ``where`` in the list, from 1, the largest magnitude is
     formula : a key of `FORMULAS`, in the place of a measure
     parts : ids of the rows that make up this one, in the place of a measure
     undecidable : why there is nothing to hold against it, in the place of a measure
@@ -116,7 +116,7 @@ class Claim(Section):
     measure: str | None = None
     signal: str | None = None
     landings: list[str] = Field(default_factory=list)
-    take: Literal["each", "range"] = "each"
+    take: Literal["each", "range", "where"] = "each"
     formula: str | None = None
     parts: list[str] = Field(default_factory=list)
     undecidable: str | None = None

@@ -90,10 +90,11 @@ def _by(row: Row) -> str:
 DIGITS = 3
 """Of ours in the table."""
 SIGNS = """## Signs
-Roll is positive where the robot's +y side rises, as in the paper. Seen from the other tower the same landing has the
-opposite sign of roll and of yaw, and the paper does not say on which side of midspan its points lie: magnitudes are
-compared. Ours lie nearer to the left tower, at y < 100 m. Z is that of b, the centre of the rotor plane: *absolute* from
-the level of the supports, *relative* from where the robot stands before it is let go."""
+Roll is positive where the robot's +y side rises, as in the paper's frames. Seen from the other tower the same landing has
+the opposite sign of roll and of yaw, and the paper does not say on which side of midspan its points lie: magnitudes are
+compared. Ours lie nearer to the left tower, at y < 100 m, where the largest roll of the judged set at point 9 is negative,
+as that of Fig. 15 is; Fig. 19 prints magnitudes. Z is that of b, the centre of the rotor plane: *absolute* from the level
+of the supports, *relative* from where the robot stands before it is let go."""
 
 FURTHER = """## Add or dispute a row
 The rows are `studies/paper/claims.toml`, the landings `studies/paper/landings.toml`. Change a tolerance, a measure or a

@@ -139,7 +139,8 @@ def _contact(book: Book) -> str:
 def _yaw(book: Book) -> str:
     words = (
         "A symmetric robot on a straight line neither yaws nor pitches. An axle that is misaligned turns the robot by as much, "
-        "as the groove aligns with the line; a centre of mass to the side makes it lean, and hardly turn."
+        "as the groove aligns with the line: it swings about that angle with a period of 5 s, and comes to rest there. A "
+        "centre of mass to the side makes it lean, and hardly turn; one ahead makes it roll."
     )
     return _section(
         book, "What yaw and pitch come from", "yaw", "robot", (YAW_END, PITCH_PEAK, ROLL_PEAK), words, "yaw"

@@ -13,7 +13,7 @@ from orchestrator.coupling.run.results import Table
 from orchestrator.runs.job import Job
 from orchestrator.scenario.types import Scenario
 from orchestrator.studies import reading
-from orchestrator.studies.book import job_of, measured
+from orchestrator.studies.book import job_of, measured, taken
 from orchestrator.studies.documents import Claim, Documents
 from orchestrator.studies.identification.measured import Series, end_of, read_series
 from orchestrator.studies.identification.study import Measurement, Study, Target
@@ -174,7 +174,7 @@ def _claimed(claim: Claim, tables: Sequence[Table]) -> np.ndarray:
     """Return ours of a claim (k,), in its unit."""
     assert claim.measure is not None and claim.signal is not None
     found = [x for table in tables for x in measured(table, claim.measure, claim.signal, claim.unit)]
-    return np.array([min(found), max(found)] if claim.take == "range" else found)
+    return np.array(taken(found, claim.take))
 
 
 # -- measurements ---------------------------------------------------------------------------------------------
