@@ -19,6 +19,7 @@ def text(book: Book, rows: Sequence[Row], pictures: Sequence[Picture], whole: bo
         _count(rows),
         _verdicts(book, rows),
         _reasons(rows),
+        _by_set(book, rows),
         SIGNS,
         _accuracy(book, rows),
     ]
@@ -62,15 +63,24 @@ def _count(rows: Sequence[Row]) -> str:
 
 
 def _verdicts(book: Book, rows: Sequence[Row]) -> str:
-    head = ("id", "where", "what", "unit", "paper", *book.sets, "verdict")
+    head = ("id", "where", "what", "unit", "paper", f"ours, `{book.judged_by}`", "verdict")
     return table(head, (_verdict(book, row) for row in rows))
 
 
 def _verdict(book: Book, row: Row) -> Iterable[str]:
     claim = row.claim
+    ours = number(_in_column(book, row, book.judged_by), DIGITS)
     fit = " (used for a fit)" if row.used_for_fit else ""
-    ours = (number(_in_column(book, row, name), DIGITS) for name in book.sets)
-    return claim.id, claim.source, claim.what, claim.unit, number(claim.values), *ours, f"**{row.verdict}**{fit}"
+    return claim.id, claim.source, claim.what, claim.unit, number(claim.values), ours, f"**{row.verdict}**{fit}"
+
+
+def _by_set(book: Book, rows: Sequence[Row]) -> str:
+    measured = [row for row in rows if row.claim.measure is not None]
+    lines = (
+        (row.claim.id, row.claim.unit, number(row.claim.values), *(number(row.ours.get(n), DIGITS) for n in book.sets))
+        for row in measured
+    )
+    return "### Ours by set\n" + table(("id", "unit", "paper", *(f"`{name}`" for name in book.sets)), lines)
 
 
 def _in_column(book: Book, row: Row, parameter_set: str) -> Sequence[float] | None:
@@ -91,7 +101,7 @@ def _by(row: Row) -> str:
     return f"; met by {', '.join(f'`{name}`' for name in row.met_by)}"
 
 
-DIGITS = 3
+DIGITS = 4
 """Of ours in the table."""
 SIGNS = """## Signs
 Roll is positive where the robot's +y side rises, as in the paper's frames. Seen from the other tower the same landing has
