@@ -155,6 +155,25 @@ def test_books_balance_with_a_thrust_over_time(kinked):
     assert work == pytest.approx(reference.signals["robot.control_work"][-1], rel=1e-3)
 
 
+def test_inputs_over_time_are_among_the_signals(kinked):
+    """The value of the table at each communication point, not the mean that the robot was given; one that is held is none."""
+    coupled, reference = kinked
+    time = coupled.table["time"]
+    for name in ("thrust", "torque.x"):
+        course = coupled.scenario.robot.inputs[name].course()
+        expected = [course.reached(t) for t in time]
+        for table in (coupled.table, reference.signals):
+            np.testing.assert_array_equal(table[f"robot.{name}"], expected)
+    after = np.searchsorted(time, 0.1234)
+    at = time[after]
+    assert coupled.table["robot.thrust"][after] == pytest.approx(
+        200.0 - 250.0 * (at - 0.1234) / (0.3017 - 0.1234), rel=1e-12
+    )
+    assert "robot.torque.y" not in coupled.table and "robot.torque.y" not in reference.signals
+    assert coupled.log.units["robot.thrust"] == "N" and coupled.log.units["robot.torque.x"] == "N.m"
+    assert reference.estimated_error["robot.thrust"] == 0.0
+
+
 def test_monolithic_steps_end_at_the_kinks():
     """So the method keeps its order: 16 times the tolerance doubles the steps, and the error is 8 times as large."""
     one, times = scenario(stop=0.4, **{THRUST: KINKED}), np.linspace(0.0, 0.4, 5)
@@ -245,6 +264,7 @@ def test_a_component_of_a_graph_follows_a_table():
     for end in (0.777, 2.0):
         y, t = solve_ivp(rate, (t, end), y, "DOP853", rtol=1e-11, atol=1e-12).y[:, -1], end
     assert table["right.position"][-1] == pytest.approx(y[1], abs=1e-5)
+    np.testing.assert_array_equal(table["right.force"], [course.reached(t) for t in table["time"]])
     assert any("fed by" in p for p in _refused("components.left.inputs.force={time=[0],value=[1]}"))
 
 
