@@ -9,7 +9,9 @@ from pathlib import Path
 import numpy as np
 import pytest
 from scipy.integrate import solve_ivp
+from typer.testing import CliRunner
 
+from orchestrator.cli.commands import app
 from orchestrator.coupling.errors import InputError
 from orchestrator.landing import audit
 from orchestrator.landing import build as landing
@@ -241,6 +243,15 @@ def test_a_component_that_has_no_input_for_the_slope_is_named():
     notes = run_coupled(one).notes
     assert "p: flow given as the mean over each macro step, without slope: the FMU has no input flow_rate" in notes
     assert not any("heat given" in note for note in notes)
+
+
+@pytest.mark.parametrize("command", ["run", "compare"])
+def test_a_robot_that_is_held_is_within(tmp_path, command):
+    """It does not move at all: its place has the error of the mesh, in proportion to the sag, and its energy round-off."""
+    found = CliRunner().invoke(app, [command, "rig_10m_setdown", "--stop", "0.1", "--out", str(tmp_path / "held")])
+    assert found.exit_code == 0, found.output
+    assert "the energy drifts" not in found.output
+    assert "MISSED" not in found.output
 
 
 # -- general graphs ----------------------------------------------------------------------------------------------
