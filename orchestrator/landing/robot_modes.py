@@ -51,6 +51,8 @@ class SystemModes:
     damping_ratio : (count,)
     shares : (count, 7) of the kinetic energy, in the order of `SHARES`
     shape : (count, n + 10) complex, of 1 kg modal mass and real where the robot moves most
+    kinds : what moves in each mode, in a word or two
+    bounce_and_pendulum : which of all modes are the robot's bounce and its swing; None where there are no two such
     """
 
     linear: Linear
@@ -59,6 +61,8 @@ class SystemModes:
     damping_ratio: np.ndarray
     shares: np.ndarray
     shape: np.ndarray
+    kinds: tuple[str, ...]
+    bounce_and_pendulum: tuple[int, int] | None
 
     @property
     def equilibrium(self) -> np.ndarray:
@@ -79,33 +83,8 @@ class SystemModes:
 
     def first(self, count: int) -> SystemModes:
         """Return the first `count` modes alone."""
-        names = ("growth", "frequency", "damping_ratio", "shares", "shape")
+        names = ("growth", "frequency", "damping_ratio", "shares", "shape", "kinds")
         return replace(self, **{name: getattr(self, name)[:count] for name in names})
-
-    @property
-    def kinds(self) -> list[str]:
-        """What moves in each mode, in a word or two."""
-        return [_kind(share, growth > GROWS) for share, growth in zip(self.shares, self.growth, strict=True)]
-
-    @property
-    def bounce_and_pendulum(self) -> tuple[int, int] | None:
-        """Which modes are the robot's bounce and its swing; None where there are no two such.
-
-        A mode answers to a force at the robot in proportion to its share by the square of its frequency. Where slope
-        couples bounce and swing, two neighbours have both; the one that swings less is the bounce.
-        """
-        vibrates = np.flatnonzero(self.frequency > 0.0)
-        if vibrates.size < 2:
-            return None
-        answer = self.shares[vibrates] / self.frequency[vibrates, None] ** 2
-        pendulum = int(np.argmax(answer[:, ROLL]))
-        vertical = answer[:, VERTICAL].copy()
-        together = vertical + vertical[pendulum]
-        close = np.abs(self.frequency[vibrates] / self.frequency[vibrates[pendulum]] - 1.0) < CLOSE
-        neighbour = close & (together > 0.5 * vertical.max())
-        neighbour[pendulum], vertical[pendulum] = False, -np.inf
-        bounce = int(np.argmax(np.where(neighbour, vertical, -np.inf) if neighbour.any() else vertical))
-        return int(vibrates[bounce]), int(vibrates[pendulum])
 
     @property
     def warnings(self) -> list[str]:
@@ -165,15 +144,35 @@ def modes(linear: Linear, count: int) -> SystemModes:
     main = np.argmax(np.abs(vectors[n : n + SPIN] * np.sqrt(np.diag(linear.inertia))[:, None]), axis=0) + n
     phase = np.exp(-1j * np.angle(vectors[main, np.arange(chosen.size)]))
     vectors = vectors * phase / np.sqrt(masses)
-    oscillates = values.imag > 0.0
-    return SystemModes(
-        linear,
-        values.real,
-        np.where(oscillates, np.abs(values) / (2.0 * np.pi), 0.0),
-        -values.real / np.abs(values),
-        shares,
-        vectors.T,
-    )
+    growth, ratio = np.real(values), -np.real(values) / np.abs(values)
+    frequency = np.where(np.imag(values) > 0.0, np.abs(values) / (2.0 * np.pi), 0.0)
+    pair = _bounce_and_pendulum(frequency, shares)
+    kinds = _kinds(shares, growth, pair)
+    return SystemModes(linear, growth, frequency, ratio, shares, vectors.T, kinds, pair)
+
+
+def _bounce_and_pendulum(frequency: np.ndarray, shares: np.ndarray) -> tuple[int, int] | None:
+    """Return which modes are the robot's bounce and its swing.
+
+    A mode answers to a force at the robot in proportion to its share by the square of its frequency. Where slope
+    couples bounce and swing, two neighbours have both; the one that swings less is the bounce.
+    """
+    vibrates = np.flatnonzero(frequency > 0.0)
+    if vibrates.size < 2:
+        return None
+    frequency, answer = frequency[vibrates], shares[vibrates] / frequency[vibrates, None] ** 2
+    pendulum, vertical = int(np.argmax(answer[:, ROLL])), answer[:, VERTICAL].copy()
+    close = np.abs(frequency / frequency[pendulum] - 1.0) < CLOSE
+    neighbour = close & (vertical + vertical[pendulum] > 0.5 * vertical.max())
+    neighbour[pendulum], vertical[pendulum] = False, -np.inf
+    bounce = int(np.argmax(np.where(neighbour, vertical, -np.inf) if neighbour.any() else vertical))
+    return int(vibrates[bounce]), int(vibrates[pendulum])
+
+
+def _kinds(shares: np.ndarray, growth: np.ndarray, pair: tuple[int, int] | None) -> tuple[str, ...]:
+    """Return what moves in each mode; bounce and swing are called so, however much of the line or each other they have."""
+    named = dict(zip(pair, ("bounce", "pendulum"), strict=True)) if pair is not None else {}
+    return tuple(named.get(k, _kind(share, growth[k] > GROWS)) for k, share in enumerate(shares))
 
 
 def _eigenvalues(linear: Linear) -> tuple[np.ndarray, np.ndarray]:
@@ -201,24 +200,24 @@ def _basis(linear: Linear) -> np.ndarray:
 
 def _chosen(values: np.ndarray, count: int) -> np.ndarray:
     """Return the places of what topples, then of the `count` slowest vibrations, one of each pair."""
-    topples = np.flatnonzero((values.imag == 0.0) & (values.real > GROWS))
-    vibrates = np.flatnonzero(values.imag > 0.0)
+    topples = np.flatnonzero((np.imag(values) == 0.0) & (np.real(values) > GROWS))
+    vibrates = np.flatnonzero(np.imag(values) > 0.0)
     slowest = vibrates[np.argsort(np.abs(values[vibrates]))][:count]
-    return np.concatenate([topples[np.argsort(-values[topples].real)], slowest])
+    return np.concatenate([topples[np.argsort(-np.real(values[topples]))], slowest])
 
 
 def _energies(linear: Linear, vectors: np.ndarray) -> tuple[np.ndarray, np.ndarray]:
     """Return the shares (count, 7) of the kinetic energy, and its whole (count,): the modal masses, kg."""
     n = linear.q.size
     line, robot = vectors[:n], vectors[n : n + SPIN]
-    parts = (robot.conj() * (linear.inertia @ robot)).real
-    whole = np.vstack([parts, np.sum((line.conj() * (linear.mass[:n, :n] @ line)).real, axis=0)])
+    parts = np.real(robot.conj() * (linear.inertia @ robot))
+    whole = np.vstack([parts, np.sum(np.real(line.conj() * (linear.mass[:n, :n] @ line)), axis=0)])
     masses = whole.sum(axis=0)
     return (whole / masses).T, masses
 
 
 def _sampled(model: Model, x: np.ndarray) -> np.ndarray:
-    return sample(model, np.ascontiguousarray(x.real)) + 1j * sample(model, np.ascontiguousarray(x.imag))
+    return sample(model, np.ascontiguousarray(np.real(x))) + 1j * sample(model, np.ascontiguousarray(np.imag(x)))
 
 
 def _kind(share: np.ndarray, topples: bool) -> str:

@@ -8,14 +8,14 @@ from __future__ import annotations
 
 import os
 from collections.abc import Callable, Iterator, Sequence
+from concurrent.futures import Future, as_completed
 from concurrent.futures import TimeoutError as RanTooLong
-from concurrent.futures import as_completed
 from contextlib import ExitStack, contextmanager
 from multiprocessing import get_context
 from pathlib import Path
 from typing import Any, Self
 
-from pebble import ProcessExpired, ProcessFuture, ProcessPool
+from pebble import ProcessExpired, ProcessPool
 
 from fmus.face.first_use import compile_modules
 from fmus.kernels.jit import is_compiled
@@ -165,7 +165,7 @@ def _begin() -> None:
     notice.muted = True
 
 
-def _ended(job: Job, store: Path, future: ProcessFuture) -> Done:
+def _ended(job: Job, store: Path, future: Future[Any]) -> Done:
     """Return how a run has ended; one that left nothing will be tried again by the next batch."""
     try:
         future.result()

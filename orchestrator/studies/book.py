@@ -2,7 +2,7 @@
 
 from __future__ import annotations
 
-from collections.abc import Iterable, Mapping
+from collections.abc import Iterable, Mapping, Sequence
 from dataclasses import dataclass
 from functools import cached_property
 
@@ -12,6 +12,7 @@ from orchestrator.coupling.run.results import Table
 from orchestrator.runs.job import Done, Job
 from orchestrator.studies.documents import Claim, Documents, Landing, Series, Variant
 from orchestrator.studies.formulas import FORMULAS
+from orchestrator.studies.identified import Identification
 from orchestrator.studies.measures import MEASURES
 from orchestrator.studies.signals import DERIVED, TO_UNIT, signal
 
@@ -28,12 +29,14 @@ class Book:
     runs : by landing and set
     series : by series and variant
     sensitivity : by the number of the assumed value and ``low`` or ``high``
+    identified : what identifications have found before
     """
 
     documents: Documents
     runs: Mapping[Key, Done]
     series: Mapping[Key, Done]
     sensitivity: Mapping[Key, Done]
+    identified: Sequence[Identification] = ()
 
     @cached_property
     def sets(self) -> list[str]:

@@ -4,7 +4,7 @@ from __future__ import annotations
 
 from collections.abc import Iterable, Sequence
 
-from orchestrator.studies import referee
+from orchestrator.studies import identified, referee
 from orchestrator.studies.book import Book
 from orchestrator.studies.markdown import filled, number, table
 from orchestrator.studies.pictures import Picture
@@ -24,7 +24,7 @@ def text(book: Book, rows: Sequence[Row], pictures: Sequence[Picture], whole: bo
         _accuracy(book, rows),
     ]
     if whole:
-        parts += [_pictures(pictures), *referee.sections(book)]
+        parts += [_pictures(pictures), *referee.sections(book), identified.section(book.identified)]
     parts += [_failures(book), FURTHER]
     return "\n\n".join(part for part in parts if part) + "\n"
 
@@ -49,12 +49,16 @@ def _sets(book: Book) -> str:
 
 def _count(rows: Sequence[Row]) -> str:
     plain = [row for row in rows if not row.claim.parts]
-    predicted = [row for row in plain if row.verdict == MET and not row.claim.used_for_fit]
-    fitted = [row for row in plain if row.verdict == MET and row.claim.used_for_fit]
+    predicted = [row for row in plain if row.verdict == MET and not row.used_for_fit]
+    fitted = [row for row in plain if row.verdict == MET and row.used_for_fit]
     numbers = {name: sum(row.verdict == name for row in plain) for name in (MET, NOT_MET, CANNOT_HOLD)}
     words = f"Of {len(plain)} claims, parts counted and not their sums, {numbers[MET]} are met, {numbers[NOT_MET]} are not, "
     words += f"{numbers[CANNOT_HOLD]} cannot hold. Of those met, {len(predicted)} are predicted"
-    words += f", and {len(fitted)} gave a number of ours, so that meeting them proves nothing." if fitted else "."
+    words += (
+        f", and {len(fitted)} gave a number of ours or were used for a fit, so that meeting them proves nothing."
+        if fitted
+        else "."
+    )
     return "## Verdicts\n" + filled(words)
 
 
@@ -66,7 +70,7 @@ def _verdicts(book: Book, rows: Sequence[Row]) -> str:
 def _verdict(book: Book, row: Row) -> Iterable[str]:
     claim = row.claim
     ours = number(_in_column(book, row, book.judged_by), DIGITS)
-    fit = " (used for a number of ours)" if claim.used_for_fit else ""
+    fit = " (used for a fit)" if row.used_for_fit else ""
     return claim.id, claim.source, claim.what, claim.unit, number(claim.values), ours, f"**{row.verdict}**{fit}"
 
 

@@ -9,7 +9,6 @@ from __future__ import annotations
 from dataclasses import dataclass
 
 import numpy as np
-from scipy.linalg import block_diag
 from scipy.spatial.transform import Rotation
 
 from fmus.cable.assembly import (
@@ -93,6 +92,7 @@ class _Contacts:
     def __init__(self, problem: Problem):
         integrator = Integrator(problem)
         self.system, self.space, self.shape = integrator.system, integrator.space, integrator.work.shape
+        self.control = integrator.loads.in_the_end
         self.memory = integrator.state.contacts
         self.arcs = self.memory[:, ARC].copy()
         self.feet = self.arcs
@@ -106,7 +106,8 @@ class _Contacts:
         cable_points(system, q, v, arcs, space.cable_point, self.shape)
         if walls(system, robot, space.cable_point, self.memory, self.out, space) != OK:
             raise ModuleError("modes: the contact law fails on the way to rest; check the pose of the robot")
-        loads(system, robot, space.cable_point, bristles, self.memory, self.out, space.generalized, space)
+        given = self.memory, self.out, space.generalized
+        loads(system, self.control, robot, space.cable_point, bristles, *given, space)
         self.feet = arcs
         found = np.zeros(q.size + N_ROBOT)
         found[q.size :] = space.generalized[6 * arcs.size :]
@@ -181,47 +182,72 @@ def at_rest(problem: Problem) -> Linear:
     ------
     ModuleError : there is none near the place where the robot lands
     """
-    contacts = _Contacts(problem)
-    model, n = problem.cable.model, problem.cable.model.weight.size
-    q, robot = problem.cable.state[:n].copy(), _still(problem)
-    start, mass = contacts.arcs.copy(), block_diag(_matrix(model, problem.cable.state[:n], 1.0, 0.0), np.eye(N_ROBOT))
-    pace, before = FIRST, np.inf
+    search = _Search(problem)
     for _ in range(MAX_ITERATIONS):
-        force = contacts.forces(q, np.zeros(n), robot, contacts.bristles)
-        contacts.arcs[:] = contacts.feet
-        if np.abs(contacts.arcs - start).max() > AWAY:
+        change = search.step()
+        if np.abs(search.contacts.arcs - search.start).max() > AWAY:
             raise ModuleError(MOVES)
-        by_place, _, slips = contacts.derivatives(q, robot)
-        residual = _residual(model, q, force)
-        stiffness = block_diag(_matrix(model, q, 0.0, 1.0), np.zeros((N_ROBOT, N_ROBOT))) - _held(model, by_place)
-        size = float(np.abs(residual[n:]).max() + np.abs(residual[:n]).max() / robot_mass(problem))
-        pace = min(pace * float(np.clip(FASTER * before / size, 0.5, 4.0)), 1e12) if size > 0.0 else 1e12
-        before = size
-        step = -np.linalg.solve(mass / pace + stiffness, residual)
-        step *= min(1.0, LARGEST / float(np.abs(step).max()))
-        q += step[:n]
-        robot = _turned(robot, step[n:])
-        contacts.forces(q, np.zeros(n), robot, contacts.bristles + slips @ step)
+        if change < TOLERANCE and search.pace > 1.0:
+            return _linear(search)
+    free = np.any(_free_wheels(search.contacts.system.robot))
+    raise ModuleError(MOVES if free else f"modes: no rest of robot and line was found; {CURE}")
+
+
+class _Search:
+    """The search for rest: where it is, and the length of its next pseudo time step."""
+
+    def __init__(self, problem: Problem):
+        self.contacts, self.model = _Contacts(problem), problem.cable.model
+        self.n = self.model.weight.size
+        self.q, self.robot = problem.cable.state[: self.n].copy(), _still(problem)
+        self.weight = float(problem.robot.values[problem.robot.table.index["mass"]])
+        self.mass = _bordered(_matrix(self.model, self.q, 1.0, 0.0), np.eye(N_ROBOT))
+        self.start = self.contacts.arcs.copy()
+        self.pace, self.before = FIRST, np.inf
+
+    def step(self) -> float:
+        """Make one step; return the largest change of a coordinate, m or rad."""
+        contacts, n = self.contacts, self.n
+        residual = _residual(self.model, self.q, contacts.forces(self.q, np.zeros(n), self.robot, contacts.bristles))
+        contacts.arcs[:] = contacts.feet
+        by_place, _, slips = contacts.derivatives(self.q, self.robot)
+        stiffness = _bordered(_matrix(self.model, self.q, 0.0, 1.0)) - _held(self.model, by_place)
+        self._adapt(float(np.abs(residual[n:]).max() + np.abs(residual[:n]).max() / self.weight))
+        change = -np.linalg.solve(self.mass / self.pace + stiffness, residual)
+        change *= min(1.0, LARGEST / max(float(np.abs(change).max()), 1e-300))
+        self.q, self.robot = self.q + change[:n], _turned(self.robot, change[n:])
+        contacts.forces(self.q, np.zeros(n), self.robot, contacts.bristles + slips @ change)
         contacts.bristles = contacts.out[:, at.ELONGATION : at.ELONGATION + 2].copy()
-        if np.abs(step).max() < TOLERANCE and pace > 1.0:
-            break
-    else:
-        free = np.any(_free_wheels(contacts.system.robot))
-        raise ModuleError(MOVES if free else f"modes: no rest of robot and line was found; {CURE}")
-    return _linear(problem, contacts, q, robot, mass)
+        return float(np.abs(change).max())
+
+    def _adapt(self, size: float) -> None:
+        """Make the pace faster as what is out of balance, `size`, gets less."""
+        if size > 0.0:
+            self.pace = min(self.pace * float(np.clip(FASTER * self.before / size, 0.5, 4.0)), 1e12)
+        self.before = size
 
 
-def _linear(problem: Problem, contacts: _Contacts, q: np.ndarray, robot: np.ndarray, mass: np.ndarray) -> Linear:
-    model, n = problem.cable.model, q.size
-    contacts.forces(q, np.zeros(n), robot, contacts.bristles)
+def _linear(search: _Search) -> Linear:
+    """Return the system about the rest that has been found."""
+    contacts, q, robot = search.contacts, search.q, search.robot
+    contacts.forces(q, np.zeros(q.size), robot, contacts.bristles)
+    there = contacts.feet, contacts.bristles
     slides = bool(np.any(contacts.out[:, at.STATUS] == law.SLIP))
     by_place, by_rate, _ = contacts.derivatives(q, robot)
-    cable = [_matrix(model, q, 0.0, 0.0, 1.0), _matrix(model, q, 0.0, 1.0)]
-    damping, stiffness = (block_diag(one, np.zeros((N_ROBOT, N_ROBOT))) for one in cable)
+    damping, stiffness = (_bordered(_matrix(search.model, q, 0.0, *one)) for one in ((0.0, 1.0), (1.0, 0.0)))
     prm = contacts.system.robot
-    matrices = mass, damping - by_rate, stiffness - by_place
-    there = contacts.feet, contacts.bristles
-    return Linear(model, q, robot, *there, *matrices, _inertia(prm, robot), _free_wheels(prm), slides)
+    matrices = search.mass, damping - by_rate, stiffness - by_place
+    return Linear(search.model, q, robot, *there, *matrices, _inertia(prm, robot), _free_wheels(prm), slides)
+
+
+def _bordered(cable: np.ndarray, robot: np.ndarray | None = None) -> np.ndarray:
+    """Return the matrix of the cable (n, n) and that of the robot, zero if there is none, as one: (n + 10, n + 10)."""
+    n = len(cable)
+    found = np.zeros((n + N_ROBOT, n + N_ROBOT))
+    found[:n, :n] = cable
+    if robot is not None:
+        found[n:, n:] = robot
+    return found
 
 
 def _free_wheels(prm: np.ndarray) -> np.ndarray:
@@ -235,11 +261,6 @@ def _still(problem: Problem) -> np.ndarray:
     robot = initial_state(problem.robot.values, problem.robot.table)
     robot[rb.VELOCITY : rb.SPIN_ANGLE] = robot[rb.SPIN : rb.RIGID] = 0.0
     return robot
-
-
-def robot_mass(problem: Problem) -> float:
-    """Return the mass of the robot, kg."""
-    return float(problem.robot.values[problem.robot.table.index["mass"]])
 
 
 def _matrix(model: Model, q: np.ndarray, cm: float, cq: float, cv: float = 0.0) -> np.ndarray:
@@ -282,5 +303,6 @@ def _turned(robot: np.ndarray, step: np.ndarray) -> np.ndarray:
 def _inertia(prm: np.ndarray, robot: np.ndarray) -> np.ndarray:
     """Return mass and inertia about G in the inertial frame: (6, 6)."""
     w, x, y, z = robot[rb.ATTITUDE : rb.VELOCITY]
-    R = Rotation.from_quat([x, y, z, w]).as_matrix()
-    return block_diag(prm[rb.MASS] * np.eye(3), R @ prm[rb.INERTIA : rb.INERTIA + 9].reshape(3, 3) @ R.T)
+    R, found = Rotation.from_quat([x, y, z, w]).as_matrix(), prm[rb.MASS] * np.eye(6)
+    found[3:, 3:] = R @ prm[rb.INERTIA : rb.INERTIA + 9].reshape(3, 3) @ R.T
+    return found

@@ -158,6 +158,7 @@ def _claim_problems(study: Study, known: Mapping[str, Claim]) -> Iterator[str]:
 
 def _job(study: Study, paper: Documents, landing: str, kept: tuple[str, ...]) -> Job:
     """Return a landing of the paper with the values of the study, keeping the signals that are measured."""
+    assert study.claims is not None
     base = job_of(paper, paper.landings.landings[landing], study.claims.parameter_set, study.set, estimate=False)
     return base if any(name in DERIVED for name in kept) else replace(base, signals=kept)
 
