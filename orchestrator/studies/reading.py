@@ -28,7 +28,8 @@ def shipped(name: str = "paper") -> Path:
 
 def load_study(folder: Path) -> Documents:
     """Read the two files in `folder`; `InputError` with all that is wrong with them."""
-    landings, claims = (_read(folder / f"{model.__name__.lower()}.toml", model) for model in (Landings, Claims))
+    landings = _read(folder / "landings.toml", Landings)
+    claims = _read(folder / "claims.toml", Claims)
     found = Documents(folder, landings, claims)
     problems = [f"{folder / 'landings.toml'}: {line}" for line in _of_landings(landings)]
     problems += [f"{folder / 'claims.toml'}: {line}" for line in _of_claims(claims, landings)]
