@@ -38,6 +38,14 @@ class Hang(Job):
 
 
 @dataclass(frozen=True)
+class Blunder(Job):
+    """Raises what no run raises for its user."""
+
+    def loaded(self):
+        return super().loaded() if parent_process() is None else 1 // 0
+
+
+@dataclass(frozen=True)
 class Threads(Job):
     """Ends the worker's process with the number of threads that its libraries are allowed."""
 
@@ -58,12 +66,13 @@ def test_runs_are_made_once_and_come_back_in_order(tmp_path: Path):
 
 
 def test_a_crash_and_a_hang_cost_themselves_alone_and_are_tried_again(tmp_path: Path):
-    bad = [Crash(**vars(job(0.3))), Hang(**vars(job(0.4)))]
+    bad = [Crash(**vars(job(0.3))), Hang(**vars(job(0.4))), Blunder(**vars(job(0.5)))]
     good = [job(0.1), job(0.2)]
-    done = run_batch([bad[0], good[0], bad[1], good[1]], tmp_path, 2, timeout=15.0)
-    assert [one.failure is None for one in done] == [False, True, False, True]
+    done = run_batch([bad[0], good[0], bad[1], good[1], bad[2]], tmp_path, 2, timeout=15.0)
+    assert [one.failure is None for one in done] == [False, True, False, True, False]
+    assert "ZeroDivisionError" in str(done[4].failure)
     assert "died (exit code 7)" in str(done[0].failure) and "longer than it may" in str(done[2].failure)
-    assert [found(one, tmp_path) for one in bad] == [None, None]
+    assert [found(one, tmp_path) for one in bad] == [None, None, None]
     assert not list(tmp_path.glob(".*")), "nothing half done is left"
     assert run_batch([job(0.3)], tmp_path, 1)[0].failure is None
 

@@ -110,7 +110,20 @@ def test_the_reference_names_every_command_and_option(from_code: Any) -> None:
     page = from_code.command_line_page()
     for option in ("--macro-steps", "--robot", "--set", "--contract"):
         assert f"`{option} " in page
-    for command in ("build", "check", "compare", "limits", "list", "modes", "report", "reproduce", "run", "validate"):
+    commands = (
+        "build",
+        "check",
+        "compare",
+        "identify",
+        "limits",
+        "list",
+        "modes",
+        "report",
+        "reproduce",
+        "run",
+        "validate",
+    )
+    for command in commands:
         assert f"## {command}\n" in page
 
 

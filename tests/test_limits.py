@@ -244,6 +244,13 @@ def test_the_scenario_comes_before_the_robot_and_this_before_the_geometry(tmp_pa
     assert of(robot=str(robot)).known["roll"].value == pytest.approx(math.radians(10.0))
 
 
+def test_the_rated_strength_is_the_conductor_s_unless_the_scenario_has_one():
+    """Its source is shown, and that of the share: a factor of safety of 2.5 of codes."""
+    conductors, own = of().known["tension"], of("limits.rated_strength={ value = 50, unit = 'kN', source = 'a test' }")
+    assert (conductors.value, conductors.reference) == (0.4, 98370.0) and "LGJ-120/70" in conductors.source
+    assert own.known["tension"].reference == 50e3 and own.known["tension"].source.endswith("rated strength: a test")
+
+
 def test_a_limit_can_be_switched_off():
     found = of("limits.roll=false", "limits.z={ value = false, source = 'assumed', reason = 'no line below' }")
     assert "roll" not in found.known and found.missing["roll"] == "switched off: command line"
@@ -290,6 +297,7 @@ def test_a_bad_limit_is_refused_with_place_cause_and_cure(override: str):
 
 def test_limits_that_lack_what_they_are_counted_by_are_refused(tmp_path: Path):
     text = LANDING.read_text(encoding="utf-8").partition("[limits]")[0] + "[limits]\n"
+    text = text.replace('conductor = "jia2025_200m"', "")
     for given, wanted in (("tension = 0.5", "rated_strength"), ("safe_clearance = 1.0", "conductor_spacing")):
         file = tmp_path / "a.toml"
         file.write_text(text + given, encoding="utf-8")
@@ -396,5 +404,6 @@ def test_a_graph_is_no_landing():
 def test_the_flagship_is_safe_and_without_damping_the_physical_one_is_not():
     safe = orchestrator.run("landing_200m_point9")
     assert safe.safe is True and safe.exit_status == 0
-    swinging = orchestrator.run("landing_200m_point9_physical", set={"cable.parameters.damping_time": 0.005})
+    assert orchestrator.run("landing_200m_point9_physical").safe is True
+    swinging = orchestrator.run("landing_200m_point9_undamped")
     assert swinging.safe is False and [n for n, x in swinging.limits.items() if x.verdict != "kept"] == ["roll"]

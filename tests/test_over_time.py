@@ -14,6 +14,7 @@ from orchestrator.coupling.errors import InputError
 from orchestrator.landing import audit
 from orchestrator.landing import build as landing
 from orchestrator.landing.monolithic import solve
+from orchestrator.landing.monolithic.linear import at_rest
 from orchestrator.landing.monolithic.solve import integrate
 from orchestrator.runs.coupled import run_coupled
 from orchestrator.scenario.over_time import OverTime, held
@@ -193,6 +194,15 @@ def test_set_down_slowly_or_let_go(lasting, said):
     peak = np.max(table["contact1.radial_force"]) / WEIGHT
     assert peak == pytest.approx(said, abs=0.005 if lasting == 5.0 else 0.05)
     assert peak > (1.0 if lasting else 2.0)
+
+
+def test_rest_and_modes_are_those_with_what_stays_of_the_thrust():
+    """Held and set down: the robot hangs on the line with its whole weight, as if there had been no thrust."""
+    ours, theirs = (at_rest(landing.problem(scenario(name))) for name in ("rig_10m_setdown", "rig_10m"))
+    np.testing.assert_allclose(ours.q, theirs.q, atol=1e-9)
+    half = at_rest(landing.problem(scenario("rig_10m_setdown", **{THRUST: "{time=[0,1],value=[0,186.2]}"})))
+    middle = ours.q.size // 12 * 6 + 2
+    assert half.q[middle] > ours.q[middle] + 1e-3
 
 
 def test_a_component_that_has_no_input_for_the_slope_is_named():

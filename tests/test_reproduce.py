@@ -1,6 +1,7 @@
 """The paper's claims: data, verdicts, proofs, and the command."""
 
 import json
+import re
 import subprocess
 import sys
 from pathlib import Path
@@ -12,6 +13,8 @@ from orchestrator.coupling.errors import InputError
 from orchestrator.runs.job import Done, Job
 from orchestrator.studies.book import Book, jobs_of, jobs_of_sensitivity, jobs_of_series
 from orchestrator.studies.documents import Claim, Claims, Documents, Landing, Landings, ParameterSet
+from orchestrator.studies.page import text
+from orchestrator.studies.pictures import draw
 from orchestrator.studies.proofs import PROOFS
 from orchestrator.studies.reading import load_study, shipped
 from orchestrator.studies.referee import still_air, windy
@@ -151,6 +154,7 @@ def test_bands_ranges_units_and_senses():
     assert verdict(claim(paper=0.5, sense="at most"))[0] == "not met"
     assert verdict(claim(paper=[1.0, 1.0], measure="band", landings=["here", "here"], take="range"))[0] == "not met"
     assert verdict(claim(paper=0.96, tolerance=0.0, relative=0.05))[0] == "met"
+    assert verdict(claim(paper=1.0, landings=["here", "here"], take="where", tolerance=0.0))[0] == "met"
 
 
 def test_parts_are_met_if_all_are():
@@ -192,6 +196,54 @@ def test_an_overshoot_beyond_twice_cannot_hold():
 def test_what_air_gives():
     assert still_air() == pytest.approx(0.0103, rel=0.01), "1 m/s, C_d 1, 18 mm, 0.91 kg/m"
     assert windy() == pytest.approx((0.121, 0.242), rel=0.01)
+
+
+# -- page and pictures ----------------------------------------------------------------------------------------
+
+
+def landed(job: Job, k: int) -> Done:
+    """Signals that look like those of a landing, in the place of a run's."""
+    fall = 1.0 - np.exp(-0.5 * TIME) * np.cos((3.0 + 0.1 * k) * TIME)
+    table = {name: 0.0 * TIME for name in job.signals}
+    table |= {
+        "robot.body.position.z": -1.3 - 0.3 * fall,
+        "robot.roll": 0.05 * (fall - 1.0),
+        "contact1.radial_force": 370.0 * fall,
+    }
+    table |= {name: (1e4 + 10.0 * i) * (1.0 + 0.1 * fall) for i, name in enumerate(table) if "tension" in name}
+    table |= {"cable.reaction_left.y": 0.0 * TIME - 1e4, "cable.reaction_left.z": 0.0 * TIME + 700.0}
+    done = Done(job, Path())
+    done.__dict__.update(table={"time": TIME, **table}, summary={"estimated_error": dict.fromkeys(table, 1e-5)})
+    return done
+
+
+@pytest.fixture(scope="module")
+def whole(paper) -> Book:
+    """The paper's study as if it had been run."""
+    groups = jobs_of(paper, paper.claims.claim), jobs_of_series(paper), jobs_of_sensitivity(paper, "point9")
+    return Book(paper, *({key: landed(job, k) for k, (key, job) in enumerate(jobs.items())} for jobs in groups))
+
+
+def test_the_page_has_every_claim_figure_and_study(paper, whole, tmp_path: Path):
+    pictures = draw(whole, tmp_path / "figures" / "reproduction")
+    rows = rows_of(whole, paper.claims.claim)
+    page = text(whole, rows, pictures, whole=True)
+    assert {row.verdict for row in rows} == {"met", "not met", "cannot hold"}
+    for claim in paper.claims.claim:
+        assert f"| {claim.id} |" in page and f"- **{claim.id}**" in page
+    named = set(re.findall(r"!\[[^]]*\]\(([^)]*)\)", page))
+    assert named == {picture.path for picture in pictures} and len(named) >= 15
+    assert all((tmp_path / name).stat().st_size < 100_000 for name in named)
+    for title in ("Where the damping comes from", "Mesh and time step", "Set down or let go", "Sensitivity"):
+        assert f"## {title}" in page
+    assert "nan" not in page and "failed" not in page
+
+
+def test_what_cannot_hold_by_symmetry_is_told_by_the_runs(paper, whole):
+    rows = {row.claim.id: row for row in rows_of(whole, paper.claims.claim)}
+    assert rows["F12-yaw"].verdict == rows["F13-pitch"].verdict == "cannot hold", "yaw and pitch are 0 in these tables"
+    assert rows["F20-roll"].verdict == "not met", "roll is not, so that the proof fails"
+    assert rows["F14"].verdict == "not met" and "F14-order met" in rows["F14"].why
 
 
 # -- the command ----------------------------------------------------------------------------------------------

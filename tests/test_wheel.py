@@ -72,6 +72,7 @@ def test_what_is_in_the_wheel(wheel, installed):
     listing = subprocess.run([sys.executable, "-m", "zipfile", "-l", str(wheel)], capture_output=True, text=True).stdout
     names = {line.split()[0] for line in listing.splitlines()}
     assert {f"orchestrator/scenarios/{path.name}" for path in (ROOT / "scenarios").glob("*.toml")} <= names
+    assert {f"orchestrator/studies/paper/{name}.toml" for name in ("claims", "landings")} <= names
     robots = (ROOT / "orchestrator" / "catalogue" / "robots").glob("*.toml")
     assert {f"orchestrator/catalogue/robots/{path.name}" for path in robots} <= names
     assert {"fmus/py.typed", "orchestrator/py.typed", "fmus/cable/README.md"} <= names
@@ -89,6 +90,8 @@ def test_it_lists_runs_and_compares_in_an_empty_folder(installed):
     assert compared.returncode == 0, compared.stderr
     again = installed("compare", "drop_5cm", "--stop", 0.1)
     assert again.returncode == 0 and "compil" not in again.stderr and "building" not in again.stderr
+    assert installed("reproduce", "--only", "T2-yaw,T4", "--out", "runs/paper").returncode == 0
+    assert (installed.work / "runs" / "paper" / "reproduction.json").is_file()
     assert [path.name for path in installed.work.iterdir()] == ["runs"]
     kept = installed.home / ".cache" / "line-landing"
     assert {path.name.partition("-")[0] for path in (kept / "fmus").iterdir()} >= {"cable", "contact", "fptlir"}

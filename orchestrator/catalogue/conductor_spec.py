@@ -34,6 +34,7 @@ class ConductorSpec(Strict):
     ----------
     title : one line for people
     youngs_modulus, metallic_area : Pa, m²; what the sets come from
+    rated_strength : N, of which the limit of tension is a share
     stiffness_sets : by name
     """
 
@@ -43,6 +44,7 @@ class ConductorSpec(Strict):
     linear_density: Annotated[Number, POSITIVE, in_unit("kg/m")]
     youngs_modulus: Annotated[Number, POSITIVE, in_unit("Pa")]
     metallic_area: Annotated[Number, POSITIVE, in_unit("m2")]
+    rated_strength: Annotated[Number, POSITIVE, in_unit("N")] | None = None
     stiffness_sets: Annotated[dict[str, StiffnessSet], Field(min_length=1)]
     _path: Path = PrivateAttr(default=Path("conductor.toml"))
 

@@ -80,7 +80,7 @@ def print_limits(limits: Limits) -> None:
     for limit in limits.known.values():
         value, unit = readable(limit.value, limit.unit)
         formula = f"{limit.formula.text} = {limit.formula.filled}" if limit.formula is not None else "given"
-        formula = f"T_max / {limit.reference:.4g} N" if limit.name == "tension" else formula
+        formula = f"T_max / {1e-3 * limit.reference:.4g} kN" if limit.name == "tension" and limit.reference else formula
         lines.append((limit.name, f"{value:.4g}", unit, formula, limit.source))
     print_table(head, lines)
     for name, why in limits.missing.items():

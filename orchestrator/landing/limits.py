@@ -67,7 +67,9 @@ def _limit(landing: Landing, name: str) -> Limit:
     if own is not None:
         return Limit(name, own.value, UNITS[name], _words(own.source or "", own.reason or ""), reference=reference)
     if name == "tension":
-        return Limit(name, SHARE_OF_STRENGTH, UNITS[name], BY_CODE, reference=reference)
+        strength = landing.scenario.provenance.get("limits.rated_strength", Provenance())
+        source = f"{BY_CODE}; rated strength: {_words(strength.source, strength.reason)}"
+        return Limit(name, SHARE_OF_STRENGTH, UNITS[name], source, reference=reference)
     if name not in DERIVED:
         raise NoRoom(NOT_GIVEN)
     formula, source = DERIVED[name](landing)
@@ -167,7 +169,9 @@ def _strength(landing: Landing) -> float:
     """Return the rated tensile strength (N) of the conductor."""
     strength = landing.scenario.limits.rated_strength
     if strength is None:
-        raise NoRoom("the conductor's rated tensile strength is not known; give limits.rated_strength")
+        raise NoRoom(
+            "the conductor's rated tensile strength is not known; give limits.rated_strength, or a conductor with one"
+        )
     return strength
 
 

@@ -8,19 +8,20 @@ from __future__ import annotations
 
 import os
 from collections.abc import Callable, Iterator, Sequence
+from concurrent.futures import Future, as_completed
 from concurrent.futures import TimeoutError as RanTooLong
-from concurrent.futures import as_completed
 from contextlib import ExitStack, contextmanager
 from multiprocessing import get_context
 from pathlib import Path
 from typing import Any, Self
 
-from pebble import ProcessExpired, ProcessFuture, ProcessPool
+from pebble import ProcessExpired, ProcessPool
 
 from fmus.face.first_use import compile_modules
 from fmus.kernels.jit import is_compiled
 from orchestrator.coupling.errors import InputError
 from orchestrator.runs.job import Done, Job, found, make
+from orchestrator.scenario.types import LandingScenario
 
 Counted = Callable[[int, int], None]
 """Told how many runs are done, and of how many."""
@@ -86,6 +87,8 @@ class Batches:
 
     def _made(self, left: dict[str, Job]) -> Iterator[tuple[str, Done]]:
         """Yield each run of `left` as it is finished."""
+        if any(isinstance(job.loaded(), LandingScenario) for job in left.values()):
+            compile_modules()
         pool, alone = self._started(), _first_of_its_kind(left)
         for keys, limit in ((alone, None), ([key for key in left if key not in alone], self.timeout)):
             futures = {pool.schedule(make, args=(left[key], self.store), timeout=limit): key for key in keys}
@@ -94,10 +97,9 @@ class Batches:
                 yield key, _ended(left[key], self.store, future)
 
     def _started(self) -> ProcessPool:
-        """Return the workers, started if they are not yet, and kernels compiled before."""
+        """Return the workers, started if they are not yet."""
         if self._pool is None:
             self.store.mkdir(parents=True, exist_ok=True)
-            compile_modules()
             self._pool = self._open.enter_context(_pool(self.workers))
         return self._pool
 
@@ -163,7 +165,7 @@ def _begin() -> None:
     notice.muted = True
 
 
-def _ended(job: Job, store: Path, future: ProcessFuture) -> Done:
+def _ended(job: Job, store: Path, future: Future[Any]) -> Done:
     """Return how a run has ended; one that left nothing will be tried again by the next batch."""
     try:
         future.result()
@@ -171,5 +173,7 @@ def _ended(job: Job, store: Path, future: ProcessFuture) -> Done:
         return Done(job, None, "took longer than it may, and was ended; give it more time (timeout)")
     except ProcessExpired as error:
         return Done(job, None, f"its process died (exit code {error.exitcode}); run the scenario alone to see why")
+    except Exception as error:  # whatever it is, it is that run's alone
+        return Done(job, None, f"{type(error).__name__}: {error}")
     done = found(job, store)
     return done if done is not None else Done(job, None, "left no results; is the disk full?")

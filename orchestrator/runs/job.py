@@ -197,6 +197,8 @@ def _monolithic(job: Job, scenario: Scenario) -> Outcome:
         raise InputError(f'{scenario.path}: no monolithic solver for it; take solver = "coupled"')
     count = round(scenario.simulation.stop_time / job.interval)
     times = np.linspace(0.0, scenario.simulation.stop_time, max(count, 1) + 1)
+    if job.signals:  # a name that is wrong is said before minutes are spent
+        _kept(job, system, {"time": times, **monolithic.solve(problem, times[:1], estimate=False).signals})
     solution = monolithic.solve(problem, times, job.tolerance, job.estimate)
     table = {"time": times, **solution.signals}
     kept = _kept(job, system, table)

@@ -194,11 +194,10 @@ def _position_problems(document: Document, known: Known) -> Iterator[Complaint]:
 
 def _limit_problems(document: Document) -> Iterator[Complaint]:
     """Yield limits that lack what they are counted by."""
-    limits, conductor = _table(document, "limits"), _table(document, "cable").get("conductor")
-    if _is_number(limits.get("tension")) and conductor is None and "rated_strength" not in limits:
-        yield Complaint(
-            "limits.tension", "is a share of the rated tensile strength; give limits.rated_strength as well"
-        )
+    limits = _table(document, "limits")
+    if _is_number(limits.get("tension")) and "rated_strength" not in limits:
+        cure = "give limits.rated_strength as well, or a conductor that has one"
+        yield Complaint("limits.tension", f"is a share of the rated tensile strength; {cure}")
     for here, there in (SPACING, SPACING[::-1]):
         if here in limits and there not in limits:
             yield Complaint(f"limits.{here}", f"says nothing without limits.{there}; give both")

@@ -10,7 +10,7 @@ from typing import Any
 
 from orchestrator.catalogue.conductor_spec import ConductorSpec, load_conductor
 from orchestrator.catalogue.documents import Document
-from orchestrator.catalogue.quantities import Complaint
+from orchestrator.catalogue.quantities import Complaint, Number
 from orchestrator.coupling.errors import InputError, nearest
 from orchestrator.scenario.check import Known
 from orchestrator.scenario.types import Provenance
@@ -35,6 +35,7 @@ def fill_line(plain: Document, known: Known, provenance: dict[str, Provenance]) 
         return [], [Complaint("", problem) for problem in error.problems]
     if chosen is not None:
         notes += _fill_cable(plain["cable"], *chosen, known, provenance)
+        _fill_strength(plain, chosen[0], provenance)
     return notes, list(_share_diameter(plain, known, provenance))
 
 
@@ -69,8 +70,19 @@ def _fill_cable(
     for name, quantity in spec.parameters(chosen).items():
         if name not in parameters and name in known.get("cable", {}):
             parameters[name] = quantity.value
-            source, reason = str(quantity.source), quantity.reason or ""
-            provenance[f"cable.parameters.{name}"] = Provenance(source, reason, quantity.unit, file=str(spec.path))
+            provenance[f"cable.parameters.{name}"] = _said(quantity, spec)
+
+
+def _fill_strength(plain: Document, spec: ConductorSpec, provenance: dict[str, Provenance]) -> None:
+    """Write the rated strength that limits of tension are counted by, where the scenario does not give it."""
+    limits = plain.setdefault("limits", {})
+    if spec.rated_strength is not None and isinstance(limits, dict) and "rated_strength" not in limits:
+        limits["rated_strength"] = spec.rated_strength.value
+        provenance["limits.rated_strength"] = _said(spec.rated_strength, spec)
+
+
+def _said(quantity: Number, spec: ConductorSpec) -> Provenance:
+    return Provenance(str(quantity.source), quantity.reason or "", quantity.unit, file=str(spec.path))
 
 
 def _share_diameter(plain: Document, known: Known, provenance: dict[str, Provenance]) -> Iterator[Complaint]:

@@ -2,7 +2,7 @@
 
 from __future__ import annotations
 
-from collections.abc import Iterable, Mapping
+from collections.abc import Iterable, Mapping, Sequence
 from dataclasses import dataclass
 from functools import cached_property
 
@@ -12,6 +12,7 @@ from orchestrator.coupling.run.results import Table
 from orchestrator.runs.job import Done, Job
 from orchestrator.studies.documents import Claim, Documents, Landing, Series, Variant
 from orchestrator.studies.formulas import FORMULAS
+from orchestrator.studies.identified import Identification
 from orchestrator.studies.measures import MEASURES
 from orchestrator.studies.signals import DERIVED, TO_UNIT, signal
 
@@ -28,12 +29,14 @@ class Book:
     runs : by landing and set
     series : by series and variant
     sensitivity : by the number of the assumed value and ``low`` or ``high``
+    identified : what identifications have found before
     """
 
     documents: Documents
     runs: Mapping[Key, Done]
     series: Mapping[Key, Done]
     sensitivity: Mapping[Key, Done]
+    identified: Sequence[Identification] = ()
 
     @cached_property
     def sets(self) -> list[str]:
@@ -64,7 +67,7 @@ class Book:
             if table is None or name is None or claim.signal is None:
                 return None
             found += measured(table, name, claim.signal, claim.unit)
-        return [min(found), max(found)] if claim.take == "range" else found
+        return taken(found, claim.take)
 
     def ours(self, claim: Claim) -> dict[str, list[float]]:
         """Return ours by set, in the claim's unit; of a formula under the name of no set."""
@@ -80,6 +83,17 @@ class Book:
             return None
         errors = [done.summary.get("estimated_error", {}).get(claim.signal) for done in runs if done is not None]
         return None if None in errors else max(errors) * TO_UNIT.get(claim.unit, 1.0)
+
+
+def taken(found: list[float], take: str) -> list[float]:
+    """Return what a claim takes of the values of its landings: see `Claim.take`."""
+    match take:
+        case "range":
+            return [min(found), max(found)]
+        case "where":
+            return [1.0 + int(np.argmax(np.abs(found)))]
+        case _:
+            return found
 
 
 def measured(table: Table, measure: str, name: str, unit: str = "1") -> list[float]:
@@ -119,7 +133,8 @@ def jobs_of_sensitivity(documents: Documents, landing: str) -> dict[Key, Job]:
 
 def _variant(documents: Documents, series: Series, variant: Variant) -> Job:
     landing = documents.landings.landings[variant.landing or series.landing]
-    return job_of(documents, landing, series.parameter_set, variant.set, variant.interval, estimate=False)
+    parameter_set = variant.parameter_set or series.parameter_set
+    return job_of(documents, landing, parameter_set, variant.set, variant.interval, estimate=False)
 
 
 def job_of(

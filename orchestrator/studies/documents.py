@@ -36,10 +36,11 @@ class Landing(Section):
 
 
 class Variant(Section):
-    """One run of a series: its `name`, and the number it stands for, if it has one."""
+    """One run of a series: its `name`, the number it stands for, if it has one, and what of the series it has not."""
 
     name: str
     value: float | None = None
+    parameter_set: str | None = None
     set: Settings = Field(default_factory=dict)
     landing: str | None = None
     interval: Positive | None = None
@@ -98,7 +99,7 @@ class Claim(Section):
     ----------
     paper : value, or several, in `unit`
     measure, signal, landings : a key of `MEASURES`, of which signal, in which landings
-    take : of several landings: ``each``, or the ``range`` of all
+    take : of several landings: ``each``, the ``range`` of all, or ``where`` in the list, from 1, the largest magnitude is
     formula : a key of `FORMULAS`, in the place of a measure
     parts : ids of the rows that make up this one, in the place of a measure
     undecidable : why there is nothing to hold against it, in the place of a measure
@@ -115,7 +116,7 @@ class Claim(Section):
     measure: str | None = None
     signal: str | None = None
     landings: list[str] = Field(default_factory=list)
-    take: Literal["each", "range"] = "each"
+    take: Literal["each", "range", "where"] = "each"
     formula: str | None = None
     parts: list[str] = Field(default_factory=list)
     undecidable: str | None = None

@@ -9,6 +9,7 @@ import numpy as np
 from matplotlib import colormaps
 from matplotlib.axes import Axes
 from matplotlib.figure import Figure
+from matplotlib.ticker import NullFormatter
 
 from orchestrator.coupling.run.results import Table
 from orchestrator.report.style import BLACK, COLOURS, LINES, MARKERS, legend_above
@@ -64,11 +65,10 @@ def styled(i: int) -> dict[str, object]:
 
 
 def finish(figure: Figure, axes: Iterable[Axes], xlabel: str) -> None:
-    """Name the horizontal axes, and put one legend above all."""
-    listed = list(axes)
-    for axis in listed:
+    """Name the horizontal axes, and put one legend of all that the figure shows above."""
+    for axis in axes:
         axis.set_xlabel(xlabel)
-    found = {label: handle for a in listed for handle, label in zip(*a.get_legend_handles_labels(), strict=True)}
+    found = {label: handle for a in figure.axes for handle, label in zip(*a.get_legend_handles_labels(), strict=True)}
     if found:
         legend_above(figure, list(found.values()), list(found))
 
@@ -85,13 +85,9 @@ def four(figure: Figure, curves: Sequence[tuple[str, Table | None, dict[str, obj
         for title, table, style in curves:
             curve(axis, table, name, unit, label=title, **style)
         axis.set_ylabel(label)
-    for axis in (axes[1], axes[3]):  # exactly 0: what is drawn is not round-off
-        axis.set_ylim(*_at_least(axis.get_ylim(), 0.15))
+    for axis in (axes[1], axes[3]):
+        axis.plot([0.0, 0.0], [-0.15, 0.15], linestyle="none")  # exactly 0: what is drawn is not round-off
     return axes
-
-
-def _at_least(limits: tuple[float, float], half: float) -> tuple[float, float]:
-    return min(limits[0], -half), max(limits[1], half)
 
 
 # -- the figures ----------------------------------------------------------------------------------------------
@@ -134,6 +130,8 @@ def between_sets(figure: Figure, book: Book) -> None:
                 )
         for error in errors:
             axis.axhline(error, **DASHED)
+        axis.yaxis.set_minor_formatter(NullFormatter())
+        axis.set_ylim(1e-4, 1.0)
     axes[0].set_ylabel("Difference of Z [m]")
     axes[1].set_ylabel("Difference of roll [°]")
     finish(figure, axes, "Time [s]")
@@ -171,16 +169,23 @@ def _relative(table: Table | None) -> Table | None:
 
 
 def tension(figure: Figure, book: Book) -> None:
-    """Fig. 14: tension along the line, landing at midspan."""
-    axis = figure.subplots()
+    """Fig. 14: tension over time, and along the line, landing at midspan."""
+    over_time, along = figure.subplots(1, 2)
     table = book.table("point1", book.judged_by)
     if table is not None:
         names = tensions(table)
-        for k, (name, colour) in enumerate(zip(names, shades(len(names)), strict=True)):
-            curve(axis, table, name, "kN", color=colour, linewidth=1.1, label=f"{20 * k} m from midspan")
-    axis.axvline(7.1, **DASHED)
-    axis.set_ylabel("Tension [kN]")
-    finish(figure, [axis], "Time [s]")
+        for i, (name, label) in enumerate(((names[0], "midspan"), (names[-1], "tower"))):
+            curve(over_time, table, name, "kN", label=label, **styled(i))
+        for i, (row, label) in enumerate(((0, "before contact"), (-1, "at the end"))):
+            values = np.array([table[name][row] for name in names])
+            along.plot(
+                np.linspace(0.0, 100.0, len(names)), values - values[0], marker="o", label=label, **styled(i + 2)
+            )
+    over_time.axvline(7.1, **DASHED)
+    over_time.set_ylabel("Tension [kN]")
+    along.set_ylabel("Tension above midspan's [N]")
+    finish(figure, [over_time], "Time [s]")
+    along.set_xlabel("From midspan [m]")
 
 
 def masses(figure: Figure, book: Book) -> None:
@@ -234,8 +239,12 @@ def over_points(figure: Figure, book: Book) -> None:
     cases = ((Z, "peak", "m", "Peak of Z [m]"), (ROLL, "largest", "deg", "Peak of roll [°]"),
              (Z, "peak_time", "s", "Time of Z's peak [s]"), (ROLL, "peak_time", "s", "Time of roll's peak [s]"))  # fmt: skip
     for axis, (name, measure, unit, label) in zip(axes, cases, strict=True):
-        for i, parameter_set in enumerate(book.sets):
-            _dots(axis, book, POINTS, range(1, 11), parameter_set, (name, measure, unit), i)
+        first = (
+            1 if (name, measure) == (ROLL, "peak_time") else 0
+        )  # at midspan there is no roll, and no time of its peak
+        shown = damped(book) if measure == "peak_time" else book.sets  # undamped, any of many peaks may be the largest
+        for i, parameter_set in enumerate(shown):
+            _dots(axis, book, POINTS[first:], range(first + 1, 11), parameter_set, (name, measure, unit), i)
         axis.set_ylabel(label)
     axes[0].plot([1.0, 11.0], [-0.82, -0.28], **PAPER)
     axes[1].plot([1.0, 9.0], [0.1, 4.98], **PAPER)
@@ -295,15 +304,16 @@ DRAWINGS = (
     Drawing("fig13", "Fig. 13: points 1 to 10", "The judged set; dashed: the band of pitch that the paper prints.", TALL,
             all_points),
     Drawing("fig14", "Fig. 14: tension along the line, landing at midspan",
-            "The judged set; dashed: when the paper's has settled at its point 0.", WIDE, tension),
+            "The judged set; dashed: when the paper's has settled at its point 0. The tower bears more than midspan by the "
+            "weight of the line per metre times the sag, some 30 N of 14 kN.", WIDE, tension),
     Drawing("fig15", "Fig. 15: 10, 55 and 100 kg at point 9",
             "The judged set; dashed and crosses: what the paper prints.", TALL, masses),
     Drawing("fig17", "Fig. 17: the rig", "Dashed: the amplitudes that the paper prints, about our final value.", TALL, rig),
     Drawing("fig18", "Fig. 18: contact force on the level rig, let go",
             "Dashed: 380 N, where the paper's settles, and 400 N, the peak of its experiment.", WIDE, rig_force),
     Drawing("fig19", "Fig. 19: peaks over the points",
-            "Crosses: the values that the paper prints, of points 1, 9 and 11; dashed: the ends of its ranges. "
-            "Roll on a scale that is linear below 1° and logarithmic above.", TALL, over_points),
+            "Crosses: the values that the paper prints, of points 1, 9 and 11; dashed: the ends of its ranges. Roll on a scale "
+            "that is linear below 1° and logarithmic above. Times of the damped sets alone.", TALL, over_points),
     Drawing("fig20", "Fig. 20: peaks over the mass",
             "The judged set; crosses: the paper's, which it gives for midspan.", TALL, over_masses),
 )  # fmt: skip

@@ -174,7 +174,7 @@ def fit(
     scale = max(1.0, chi2 / max(residual.size - free.size, 1))
     covariance, determined = _covariance(space.slopes(best, free), scale)
     space.stage = "profiles"
-    intervals = [_interval(space, best, covariance, i, chi2, scale) if effort.profile else None for i in free]
+    intervals = [_interval(space, best, covariance, int(i), chi2, scale) if effort.profile else None for i in free]
     estimates = [
         _estimate(p, float(best[i]), float(covariance[i, i]), bool(determined[i]), intervals[i])
         for i, p in enumerate(space.parameters)
@@ -214,7 +214,7 @@ def _refined(space: _Space, start: np.ndarray, free: np.ndarray) -> np.ndarray:
     found = least_squares(
         lambda x: space.one(whole(x)),
         inside,
-        lambda x: space.slopes(whole(x), free),
+        lambda x: space.slopes(whole(x), free),  # type: ignore[arg-type]
         bounds=(0.0, 1.0),
         xtol=1e-4,
         ftol=1e-4,

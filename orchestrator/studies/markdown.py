@@ -6,6 +6,8 @@ import textwrap
 from collections.abc import Iterable, Sequence
 
 WIDTH = 118
+ROUND_OFF = 1e-9
+"""Below which ours is 0, in any unit of a claim."""
 
 
 def table(head: Sequence[str], rows: Iterable[Iterable[str]]) -> str:
@@ -20,9 +22,16 @@ def filled(words: str, indent: str = "") -> str:
 
 
 def number(values: Sequence[float] | None, digits: int = 0) -> str:
-    """Return values for a reader, with so many digits; 0: as they were written."""
+    """Return values for a reader, with so many digits; 0: as they were written. What is round-off of 0 is 0."""
     if values is None:
         return "–"
-    form = f"{{:.{digits}g}}" if digits else "{:g}"
-    shown = [form.format(v) if abs(v) < 1e5 else f"{v:.3g}" for v in values]
+    shown = [_shown(value, digits) for value in values]
     return " … ".join(shown) if len(shown) == 2 else ", ".join(shown)
+
+
+def _shown(value: float, digits: int) -> str:
+    if digits and abs(value) < ROUND_OFF:
+        return "0"
+    if abs(value) >= 1e5:
+        return f"{value:.3g}"
+    return f"{value:.{digits}g}" if digits else f"{value:g}"

@@ -4,7 +4,7 @@ from __future__ import annotations
 
 from collections.abc import Iterable, Sequence
 
-from orchestrator.studies import referee
+from orchestrator.studies import identified, referee
 from orchestrator.studies.book import Book
 from orchestrator.studies.markdown import filled, number, table
 from orchestrator.studies.pictures import Picture
@@ -19,11 +19,12 @@ def text(book: Book, rows: Sequence[Row], pictures: Sequence[Picture], whole: bo
         _count(rows),
         _verdicts(book, rows),
         _reasons(rows),
+        _by_set(book, rows),
         SIGNS,
         _accuracy(book, rows),
     ]
     if whole:
-        parts += [_pictures(pictures), *referee.sections(book)]
+        parts += [_pictures(pictures), *referee.sections(book), identified.section(book.identified)]
     parts += [_failures(book), FURTHER]
     return "\n\n".join(part for part in parts if part) + "\n"
 
@@ -48,25 +49,38 @@ def _sets(book: Book) -> str:
 
 def _count(rows: Sequence[Row]) -> str:
     plain = [row for row in rows if not row.claim.parts]
-    predicted = [row for row in plain if row.verdict == MET and not row.claim.used_for_fit]
-    fitted = [row for row in plain if row.verdict == MET and row.claim.used_for_fit]
+    predicted = [row for row in plain if row.verdict == MET and not row.used_for_fit]
+    fitted = [row for row in plain if row.verdict == MET and row.used_for_fit]
     numbers = {name: sum(row.verdict == name for row in plain) for name in (MET, NOT_MET, CANNOT_HOLD)}
     words = f"Of {len(plain)} claims, parts counted and not their sums, {numbers[MET]} are met, {numbers[NOT_MET]} are not, "
     words += f"{numbers[CANNOT_HOLD]} cannot hold. Of those met, {len(predicted)} are predicted"
-    words += f", and {len(fitted)} gave a number of ours, so that meeting them proves nothing." if fitted else "."
+    words += (
+        f", and {len(fitted)} gave a number of ours or were used for a fit, so that meeting them proves nothing."
+        if fitted
+        else "."
+    )
     return "## Verdicts\n" + filled(words)
 
 
 def _verdicts(book: Book, rows: Sequence[Row]) -> str:
-    head = ("id", "where", "what", "unit", "paper", *book.sets, "verdict")
+    head = ("id", "where", "what", "unit", "paper", f"ours, `{book.judged_by}`", "verdict")
     return table(head, (_verdict(book, row) for row in rows))
 
 
 def _verdict(book: Book, row: Row) -> Iterable[str]:
     claim = row.claim
-    fit = " (used for a number of ours)" if claim.used_for_fit else ""
-    ours = (number(_in_column(book, row, name), DIGITS) for name in book.sets)
-    return claim.id, claim.source, claim.what, claim.unit, number(claim.values), *ours, f"**{row.verdict}**{fit}"
+    ours = number(_in_column(book, row, book.judged_by), DIGITS)
+    fit = " (used for a fit)" if row.used_for_fit else ""
+    return claim.id, claim.source, claim.what, claim.unit, number(claim.values), ours, f"**{row.verdict}**{fit}"
+
+
+def _by_set(book: Book, rows: Sequence[Row]) -> str:
+    measured = [row for row in rows if row.claim.measure is not None]
+    lines = (
+        (row.claim.id, row.claim.unit, number(row.claim.values), *(number(row.ours.get(n), DIGITS) for n in book.sets))
+        for row in measured
+    )
+    return "### Ours by set\n" + table(("id", "unit", "paper", *(f"`{name}`" for name in book.sets)), lines)
 
 
 def _in_column(book: Book, row: Row, parameter_set: str) -> Sequence[float] | None:
@@ -87,13 +101,14 @@ def _by(row: Row) -> str:
     return f"; met by {', '.join(f'`{name}`' for name in row.met_by)}"
 
 
-DIGITS = 3
+DIGITS = 4
 """Of ours in the table."""
 SIGNS = """## Signs
-Roll is positive where the robot's +y side rises, as in the paper. Seen from the other tower the same landing has the
-opposite sign of roll and of yaw, and the paper does not say on which side of midspan its points lie: magnitudes are
-compared. Ours lie nearer to the left tower, at y < 100 m. Z is that of b, the centre of the rotor plane: *absolute* from
-the level of the supports, *relative* from where the robot stands before it is let go."""
+Roll is positive where the robot's +y side rises, as in the paper's frames. Seen from the other tower the same landing has
+the opposite sign of roll and of yaw, and the paper does not say on which side of midspan its points lie: magnitudes are
+compared. Ours lie nearer to the left tower, at y < 100 m, where the largest roll of the judged set at point 9 is negative,
+as that of Fig. 15 is; Fig. 19 prints magnitudes. Z is that of b, the centre of the rotor plane: *absolute* from the level
+of the supports, *relative* from where the robot stands before it is let go."""
 
 FURTHER = """## Add or dispute a row
 The rows are `studies/paper/claims.toml`, the landings `studies/paper/landings.toml`. Change a tolerance, a measure or a

@@ -50,7 +50,8 @@ def _of_landings(found: Landings) -> Iterator[str]:
     for name, series in found.series.items():
         wanted = [series.landing, *(v.landing for v in series.variant if v.landing is not None)]
         yield from _unknown(f"series.{name}.landing", wanted, found.landings, "landing")
-        yield from _unknown(f"series.{name}.parameter_set", [series.parameter_set], found.sets, "set")
+        sets = [series.parameter_set, *(v.parameter_set for v in series.variant if v.parameter_set is not None)]
+        yield from _unknown(f"series.{name}.parameter_set", sets, found.sets, "set")
         if bool(series.values) != (series.key is not None):
             yield f"series.{name}: key and values belong together; give both, or variants alone"
 

@@ -9,13 +9,15 @@ from dataclasses import dataclass
 from orchestrator.coupling.run.results import Table
 from orchestrator.runs.job import Done
 from orchestrator.studies.book import Book, measured
-from orchestrator.studies.markdown import filled, table
+from orchestrator.studies.markdown import filled, number, table
 
 Z, ROLL, PITCH, YAW, FORCE = (
     "robot.body.position.z", "robot.roll", "robot.pitch", "robot.yaw", "contact1.radial_force",
 )  # fmt: skip
 AIR_DENSITY, DRAG, DIAMETER, LINE = 1.225, 1.0, 0.018, 0.91
 """kg/m³ at sea level; C_d of a cylinder below the drag crisis (Hoerner 1965); m and kg/m of the paper's line."""
+DIGITS = 4
+"""Of a number in a table."""
 STILL_SPEED, WIND = 1.0, 10.0
 """m/s: how fast the line moves near the robot in a landing; the wind."""
 
@@ -38,6 +40,7 @@ Z_PEAK = Asked("relative peak of Z [m]", "peak", Z, "m")
 ROLL_PEAK = Asked("peak of roll [°]", "largest", ROLL, "deg")
 SETTLING = Asked("Z settles [s]", "settling_time", Z, "s")
 FORCE_PEAK = Asked("peak force [N]", "highest", FORCE, "N")
+SINKS = Asked("sinks in [mm]", "settled", "contact1.penetration", "mm")
 YAW_END = Asked("yaw at the end [°]", "end", YAW, "deg")
 PITCH_PEAK = Asked("largest pitch [°]", "largest", PITCH, "deg")
 USUAL = (Z_PEAK, ROLL_PEAK, SETTLING)
@@ -59,8 +62,15 @@ def windy(wind: float = WIND) -> tuple[float, float]:
 
 def sections(book: Book) -> Iterator[str]:
     """Yield the sections of the page: one for each series that the study has, and the sensitivity."""
-    writers = {"damping": _damping, "mesh": _mesh, "area": _area, "yaw": _yaw, "set_down": _set_down}
-    yield "# What a referee asks for"
+    writers = {
+        "damping": _damping,
+        "mesh": _mesh,
+        "area": _area,
+        "contact": _contact,
+        "yaw": _yaw,
+        "set_down": _set_down,
+    }
+    yield "## What a referee asks for"
     for name, write in writers.items():
         if name in book.documents.landings.series:
             yield write(book)
@@ -103,7 +113,7 @@ def _mesh(book: Book) -> str:
     for name, _, found in rows:
         off = [_share(asked.of(found), asked.of(finest)) if found and finest else "–" for _, asked in extra]
         lines.append((name, *_cells(found, USUAL), *off))
-    return "\n\n".join(["## Mesh and time step", filled(words), table(head, lines)])
+    return "\n\n".join(["### Mesh and time step", filled(words), table(head, lines)])
 
 
 def _share(value: float, of: float) -> str:
@@ -118,10 +128,21 @@ def _area(book: Book) -> str:
     return _section(book, "Axial stiffness", "area", "EA [N]", USUAL, words, "area")
 
 
+def _contact(book: Book) -> str:
+    words = (
+        "The paper gives no stiffness of the contact. ADAMS' default, 1e5 N/mm, is 1e8 N/m at an exponent of 1 alone; at the "
+        "paper's 2.5 it is 3.16e12, and 38 kg sink 0.2 mm in place of half the line's diameter. With the line damped the "
+        "choice moves Z by a few per cent. Undamped, bounce and pendulum are near resonance, and roll answers to it."
+    )
+    title, asked = "Stiffness and damping of the contact", (Z_PEAK, ROLL_PEAK, FORCE_PEAK, SINKS)
+    return _section(book, title, "contact", "contact", asked, words)
+
+
 def _yaw(book: Book) -> str:
     words = (
         "A symmetric robot on a straight line neither yaws nor pitches. An axle that is misaligned turns the robot by as much, "
-        "as the groove aligns with the line; a centre of mass to the side makes it lean, and hardly turn."
+        "as the groove aligns with the line: it swings about that angle with a period of 5 s, and comes to rest there. A "
+        "centre of mass to the side makes it lean, and hardly turn; one ahead makes it roll."
     )
     return _section(
         book, "What yaw and pitch come from", "yaw", "robot", (YAW_END, PITCH_PEAK, ROLL_PEAK), words, "yaw"
@@ -137,15 +158,17 @@ def _set_down(book: Book) -> str:
     return _section(book, "Set down or let go", "set_down", "", asked, words, "set_down")
 
 
-def _section(book: Book, title: str, series: str, first: str, asked: Sequence[Asked], words: str, picture: str) -> str:
+def _section(
+    book: Book, title: str, series: str, first: str, asked: Sequence[Asked], words: str, picture: str = ""
+) -> str:
     rows = ((name, *_cells(found, asked)) for name, _, found in tables_of(book, series))
     head = (first or "run", *(one.title for one in asked))
-    shown = f"![{title}](figures/reproduction/{picture}.png)"
-    return "\n\n".join([f"## {title}", filled(words), table(head, rows), shown])
+    shown = [f"![{title}](figures/reproduction/{picture}.png)"] if picture else []
+    return "\n\n".join([f"### {title}", filled(words), table(head, rows), *shown])
 
 
 def _cells(found: Table | None, asked: Iterable[Asked]) -> list[str]:
-    return [f"{one.of(found):.3g}" if found is not None else "failed" for one in asked]
+    return [number([one.of(found)], DIGITS) if found is not None else "failed" for one in asked]
 
 
 # -- sensitivity ----------------------------------------------------------------------------------------------
@@ -183,7 +206,7 @@ def _sensitivity(book: Book) -> str:
     )
     head = ("number", "from … to", *(one.title.split(" [")[0] for one in SENSITIVE), "reason")
     shown = "![Sensitivity](figures/reproduction/sensitivity.png)"
-    return "\n\n".join(["## Sensitivity to every assumed number", filled(words), table(head, rows), shown])
+    return "\n\n".join(["### Sensitivity to every assumed number", filled(words), table(head, rows), shown])
 
 
 def _both(pair: tuple[float, float]) -> str:

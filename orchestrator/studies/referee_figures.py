@@ -43,7 +43,6 @@ def area(figure: Figure, book: Book) -> None:
     axes = figure.subplots(1, 2)
     for axis, asked in zip(axes, (Z_PEAK, ROLL_PEAK), strict=True):
         _over(axis, book, "area", asked)
-        axis.set_xscale("log")
         axis.set_ylabel(asked.title[:1].upper() + asked.title[1:])
     finish(figure, axes, "Axial stiffness [N]")
 

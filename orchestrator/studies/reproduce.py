@@ -12,6 +12,7 @@ from orchestrator.coupling.errors import DONE, FAILED
 from orchestrator.coupling.run.results import replacing, write_json
 from orchestrator.runs.batch import Counted, run_batch
 from orchestrator.runs.job import Done, Job
+from orchestrator.studies import identified
 from orchestrator.studies.book import Book, jobs_of, jobs_of_sensitivity, jobs_of_series
 from orchestrator.studies.documents import Claim, Documents
 from orchestrator.studies.reading import load_study, shipped
@@ -86,7 +87,8 @@ def _run(
     ends = jobs_of_sensitivity(documents, SENSITIVE) if whole and documents.landings.assumed else {}
     done = run_batch([*jobs.values(), *series.values(), *ends.values()], out, workers, TIMEOUT, progress)
     first, second = len(jobs), len(jobs) + len(series)
-    return Book(documents, _named(jobs, done[:first]), _named(series, done[first:second]), _named(ends, done[second:]))
+    groups = (_named(jobs, done[:first]), _named(series, done[first:second]), _named(ends, done[second:]))
+    return Book(documents, *groups, identified.load(documents.folder))
 
 
 def _named(jobs: dict[K, Job], done: Sequence[Done]) -> dict[K, Done]:

@@ -3,11 +3,12 @@
 from __future__ import annotations
 
 from collections.abc import Iterable, Mapping, Sequence
-from dataclasses import dataclass, field
+from dataclasses import dataclass, field, replace
 from typing import Any
 
 from orchestrator.studies.book import Book
 from orchestrator.studies.documents import Claim
+from orchestrator.studies.identified import is_used
 from orchestrator.studies.proofs import PROOFS
 
 MET, NOT_MET, CANNOT_HOLD = "met", "not met", "cannot hold"
@@ -23,6 +24,8 @@ class Row:
     difference : the largest, ours less the paper's, by set
     met_by : the sets that meet it
     error : estimated error of ours, in the claim's unit; None if not known
+    identified : values by identification: of the parameters that it has found
+    fitted : whether one of them was fitted to it
     """
 
     claim: Claim
@@ -32,6 +35,13 @@ class Row:
     difference: Mapping[str, float] = field(default_factory=dict)
     met_by: Sequence[str] = ()
     error: float | None = None
+    identified: Mapping[str, Sequence[float]] = field(default_factory=dict)
+    fitted: bool = False
+
+    @property
+    def used_for_fit(self) -> bool:
+        """Whether a number of ours, or an identification, was made from it, so that meeting it proves nothing."""
+        return self.claim.used_for_fit or self.fitted
 
     def content(self) -> dict[str, Any]:
         """Return what ``reproduction.json`` says of it."""
@@ -39,9 +49,9 @@ class Row:
         return {
             "id": claim.id,
             "paper": claim.paper,
-            "ours": {name: bare(values) for name, values in self.ours.items()},
+            "ours": {name: bare(values) for name, values in (*self.ours.items(), *self.identified.items())},
             "verdict": self.verdict,
-            "used_for_fit": claim.used_for_fit,
+            "used_for_fit": self.used_for_fit,
             "why": self.why,
             "unit": claim.unit,
             "what": claim.what,
@@ -57,7 +67,9 @@ def rows_of(book: Book, claims: Iterable[Claim]) -> list[Row]:
     rows: dict[str, Row] = {}
     listed = list(claims)
     for claim in [c for c in listed if not c.parts] + [c for c in listed if c.parts]:
-        rows[claim.id] = _of_parts(claim, rows) if claim.parts else _row(book, claim)
+        row = _of_parts(claim, rows) if claim.parts else _row(book, claim)
+        values = {f"identified: {one.name}": x for one in book.identified if (x := one.ours(claim.id)) is not None}
+        rows[claim.id] = replace(row, identified=values, fitted=is_used(book.identified, claim.id))
     return [rows[claim.id] for claim in listed]
 
 

@@ -26,6 +26,14 @@ class ControlLoads:
         for name, place in places.items():
             self.values[0, place] = robot.values[robot.table.index[name]]
 
+    @property
+    def in_the_end(self) -> np.ndarray:
+        """The loads that stay when all courses are over: (4 + 7 n_wheels,)."""
+        found = self.values[0].copy()
+        for place, course in self.courses.items():
+            found[place] = course.value[-1]
+        return found
+
     def kinks(self, start: float, end: float) -> list[float]:
         """Return the times within (`start`, `end`) at which one of the loads is not straight."""
         return sorted({t for course in self.courses.values() for t in course.kinks(start, end)})

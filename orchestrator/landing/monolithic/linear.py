@@ -48,8 +48,6 @@ MAX_ITERATIONS, TOLERANCE = 150, 1e-11
 FIRST, FASTER, LARGEST = 1e-4, 1.5, 0.05
 """First pseudo time step, s, in which the robot falls 1 mm; its growth while what is out of balance stays as it is; largest
 change of a coordinate in an iteration, m and rad."""
-FAR = 1e9
-"""s; by then inputs that change over time are what they end with."""
 AWAY = 1.0
 """m; a robot that moves so far along the line has no rest where it lands."""
 MOVES = (
@@ -94,8 +92,7 @@ class _Contacts:
     def __init__(self, problem: Problem):
         integrator = Integrator(problem)
         self.system, self.space, self.shape = integrator.system, integrator.space, integrator.work.shape
-        integrator.loads.set(FAR, FAR)
-        self.control = integrator.loads.values[0].copy()
+        self.control = integrator.loads.in_the_end
         self.memory = integrator.state.contacts
         self.arcs = self.memory[:, ARC].copy()
         self.feet = self.arcs
@@ -109,7 +106,8 @@ class _Contacts:
         cable_points(system, q, v, arcs, space.cable_point, self.shape)
         if walls(system, robot, space.cable_point, self.memory, self.out, space) != OK:
             raise ModuleError("modes: the contact law fails on the way to rest; check the pose of the robot")
-        loads(system, self.control, robot, space.cable_point, bristles, self.memory, self.out, space.generalized, space)
+        given = self.memory, self.out, space.generalized
+        loads(system, self.control, robot, space.cable_point, bristles, *given, space)
         self.feet = arcs
         found = np.zeros(q.size + N_ROBOT)
         found[q.size :] = space.generalized[6 * arcs.size :]

@@ -13,7 +13,7 @@ from orchestrator.coupling.run.results import Table
 from orchestrator.runs.job import Job
 from orchestrator.scenario.types import Scenario
 from orchestrator.studies import reading
-from orchestrator.studies.book import job_of, measured
+from orchestrator.studies.book import job_of, measured, taken
 from orchestrator.studies.documents import Claim, Documents
 from orchestrator.studies.identification.measured import Series, end_of, read_series
 from orchestrator.studies.identification.study import Measurement, Study, Target
@@ -158,6 +158,7 @@ def _claim_problems(study: Study, known: Mapping[str, Claim]) -> Iterator[str]:
 
 def _job(study: Study, paper: Documents, landing: str, kept: tuple[str, ...]) -> Job:
     """Return a landing of the paper with the values of the study, keeping the signals that are measured."""
+    assert study.claims is not None
     base = job_of(paper, paper.landings.landings[landing], study.claims.parameter_set, study.set, estimate=False)
     return base if any(name in DERIVED for name in kept) else replace(base, signals=kept)
 
@@ -174,7 +175,7 @@ def _claimed(claim: Claim, tables: Sequence[Table]) -> np.ndarray:
     """Return ours of a claim (k,), in its unit."""
     assert claim.measure is not None and claim.signal is not None
     found = [x for table in tables for x in measured(table, claim.measure, claim.signal, claim.unit)]
-    return np.array([min(found), max(found)] if claim.take == "range" else found)
+    return np.array(taken(found, claim.take))
 
 
 # -- measurements ---------------------------------------------------------------------------------------------
