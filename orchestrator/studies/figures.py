@@ -228,7 +228,7 @@ def rig_force(figure: Figure, book: Book) -> None:
         curve(axis, book.table("rig_level", name), FORCE, "1", label=name, **styled(i))
     for level in (380.0, 400.0):
         axis.axhline(level, **DASHED)
-    axis.set_xlim(0.0, 10.0)
+    axis.set_xlim(0.0, 5.0)
     axis.set_ylabel("Resultant of both walls [N]")
     finish(figure, [axis], "Time [s]")
 
