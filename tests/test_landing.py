@@ -81,11 +81,12 @@ SHORT = {"stop": 0.01, "macro_step": 0.005}
 
 
 def test_a_run_reads_each_file_once(tmp_path: Path, monkeypatch):
-    """Scenario, stiffness set, robot and FMUs, the second run of the error estimate included."""
+    """Scenario, conductor, stiffness set, robot and FMUs, the second run of the error estimate included."""
     monkeypatch.setenv("LINE_LANDING_FMUS", str(tmp_path))  # FMUs at a place where no earlier test has read them
     with counted(monkeypatch) as counts:
         orchestrator.run(LANDING, robot=HYBRID, **SHORT)
-    assert len(counts) == 6 and {LANDING.name, f"{HYBRID}.toml", "adams_si.toml"} <= set(counts)
+    named = {LANDING.name, f"{HYBRID}.toml", "adams_si.toml", "jia2025_200m.toml"}
+    assert len(counts) == 7 and named <= set(counts)
     assert max(counts.values()) == 1, counts
 
 
