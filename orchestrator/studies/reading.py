@@ -11,7 +11,7 @@ from pydantic import BaseModel, ValidationError
 from orchestrator.catalogue.documents import read
 from orchestrator.catalogue.quantities import complaints
 from orchestrator.coupling.errors import InputError, nearest
-from orchestrator.studies.documents import Claims, Documents, Landings
+from orchestrator.studies.documents import PLACE, Claims, Documents, Landings
 from orchestrator.studies.formulas import FORMULAS
 from orchestrator.studies.measures import MEASURES
 from orchestrator.studies.proofs import PROOFS
@@ -60,6 +60,9 @@ def _of_landings(found: Landings) -> Iterator[str]:
 def _of_claims(found: Claims, landings: Landings) -> Iterator[str]:
     yield from _unknown("judged_by", [found.judged_by], landings.sets, "set")
     ids = [claim.id for claim in found.claim]
+    places = [place for finding in found.findings for place in PLACE.findall(finding)]
+    yield from _unknown("findings", (name for name, _ in places), ids, "claim")
+    yield from _unknown("findings", (name for _, name in places if name), landings.sets, "set")
     for i, claim in enumerate(found.claim, start=1):
         place = f"claim[{i}] ({claim.id})"
         if ids.count(claim.id) > 1 and ids.index(claim.id) < i - 1:
