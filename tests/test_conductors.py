@@ -136,6 +136,7 @@ def test_wrong_names(file: Path):
     )
     wrong = problem(file, ["cable.stiffness_set=metalic"])
     assert "cable.stiffness_set: jia2025_200m has no set 'metalic'; did you mean metallic?" in wrong
+    assert len(problem(file, ["cable.stiffness_set=3"]).splitlines()) == 1
     file.write_text(TEXT.replace(', stiffness_set = "metallic"', ""), encoding="utf-8")
     assert "cable.stiffness_set: missing; jia2025_200m has table1, physical, metallic" in problem(file)
 

@@ -105,7 +105,7 @@ def test_a_table_is_replaced_whole(tmp_path):
         ('{time=[0],value=[1],interpolation="cubic"}', "interpolation: 'cubic' must be 'linear' or 'step'"),
         ('{time=[0],value=[1],unit="kg"}', "kg"),
         ('{time=[0],value=[1],source="assumed"}', "what is assumed needs its reason"),
-        ('{file="none.csv"}', "none.csv: cannot be read as a table of inputs"),
+        ('{file="none.csv"}', "none.csv: cannot be read (No such file or directory); check the path"),
     ],
 )
 def test_wrong_tables_are_refused(value, said):

@@ -31,6 +31,8 @@ def given(cable: Document) -> tuple[list[Given], list[Complaint]]:
     there = list(spec.stiffness_sets)
     if wanted is None:
         return [], [Complaint(f"cable.{SET}", f"missing; {name} has {', '.join(there)}")]
+    if not isinstance(wanted, str):
+        return [], []
     if wanted not in there:
         hint = nearest(str(wanted), there) or f"; it has {', '.join(there)}"
         return [], [Complaint(f"cable.{SET}", f"{name} has no set {wanted!r}{hint}")]
