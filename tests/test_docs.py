@@ -121,6 +121,7 @@ def test_the_reference_names_every_command_and_option(from_code: Any) -> None:
         "report",
         "reproduce",
         "run",
+        "sweep",
         "validate",
     )
     for command in commands:

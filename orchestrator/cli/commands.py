@@ -19,6 +19,7 @@ import orchestrator
 from orchestrator.cli import modes, new, options, printing
 from orchestrator.cli.identify import identify
 from orchestrator.cli.start import importing
+from orchestrator.cli.sweep import sweep
 
 
 class Commands(TyperGroup):
@@ -69,6 +70,7 @@ app = typer.Typer(
 )
 app.add_typer(new.app, name="new")
 app.command()(identify)
+app.command()(sweep)
 
 
 def _print_version(asked: bool) -> None:

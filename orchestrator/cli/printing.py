@@ -206,7 +206,7 @@ def print_reproduction(found: Reproduction) -> None:
     judge = found.book.judged_by
     ours = [row.ours.get(judge) or next(iter(row.ours.values()), None) for row in found.rows]
     rows = (
-        (row.claim.id, number(row.claim.values), number(values, 3), row.claim.unit, row.verdict)
+        (row.claim.id, number(row.claim.values), number(values, 4), row.claim.unit, row.verdict)
         for row, values in zip(found.rows, ours, strict=True)
     )
     print_table(("claim", "paper", f"ours, {judge}", "unit", "verdict"), rows)

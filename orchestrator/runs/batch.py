@@ -25,6 +25,8 @@ from orchestrator.scenario.types import LandingScenario
 
 Counted = Callable[[int, int], None]
 """Told how many runs are done, and of how many."""
+Ended = Callable[[Done], None]
+"""Told of each run as it has ended."""
 ONE_THREAD = ("OPENBLAS_NUM_THREADS", "OMP_NUM_THREADS", "MKL_NUM_THREADS", "VECLIB_MAXIMUM_THREADS")
 COMPILED = {"monolithic": "orchestrator.landing.monolithic", "coupled": "fmus.cable"}
 """The package whose kernels each solver needs last."""
@@ -73,15 +75,23 @@ class Batches:
         self._pool = None
         self._open.__exit__(*error)
 
-    def run(self, jobs: Sequence[Job], progress: Counted = lambda done, of: None) -> list[Done]:
-        """Make those of `jobs` that the store has not, and return all in their order."""
+    def run(
+        self,
+        jobs: Sequence[Job],
+        progress: Counted = lambda done, of: None,
+        ended: Ended = lambda done: None,
+    ) -> list[Done]:
+        """Make those of `jobs` that the store has not, and return all in their order; `ended` hears of those it has, too."""
         keys = _keys(jobs)
         unique = dict(zip(keys, jobs, strict=True))
         ready = {key: done for key, job in unique.items() if (done := found(job, self.store)) is not None}
+        for done in ready.values():
+            ended(done)
         progress(len(ready), len(unique))
         left = {key: job for key, job in unique.items() if key not in ready}
         for key, done in self._made(left) if left else ():
             ready[key] = done
+            ended(done)
             progress(len(ready), len(unique))
         return [Done(job, ready[key].directory, ready[key].failure) for key, job in zip(keys, jobs, strict=True)]
 
@@ -91,7 +101,9 @@ class Batches:
             compile_modules()
         pool, alone = self._started(), _first_of_its_kind(left)
         for keys, limit in ((alone, None), ([key for key in left if key not in alone], self.timeout)):
-            futures = {pool.schedule(make, args=(left[key], self.store), timeout=limit): key for key in keys}
+            futures: dict[Future[None], str] = {
+                pool.schedule(make, args=(left[key], self.store), timeout=limit): key for key in keys
+            }
             for future in as_completed(futures):
                 key = futures[future]
                 yield key, _ended(left[key], self.store, future)

@@ -21,14 +21,15 @@ import numpy as np
 from fmus.kernels.jit import VERSIONS, sources
 from fmus.module.variables import ModuleError
 from orchestrator.catalogue import documents
-from orchestrator.catalogue.robot_spec import is_file, load_robot
+from orchestrator.catalogue.robot_spec import load_robot
+from orchestrator.catalogue.shelf import is_file
 from orchestrator.coupling.errors import InputError, RunError, nearest
 from orchestrator.coupling.run.interrupt import Interruption
 from orchestrator.coupling.run.results import Table, plain, read_json, read_table
 from orchestrator.landing import audit, monolithic
 from orchestrator.runs.coupled import run_coupled
 from orchestrator.runs.directory import RunDirectory
-from orchestrator.runs.summary import result
+from orchestrator.runs.summary import NO_LANDING, extremes, result
 from orchestrator.runs.systems import System, resolve
 from orchestrator.scenario.read import load
 from orchestrator.scenario.settings import texts
@@ -53,6 +54,8 @@ class Job:
     tolerance : m, local error of the robot's position that a step of the monolithic solver may make
     estimate : whether the monolithic solver estimates its error, by a second run
     signals : names of those that are kept; empty: all but the cable's shape
+    keep : whether signals are kept at all; without them a run is its summary
+    extremes : signals of which the summary has to have start, end, least and largest value
     """
 
     scenario: str
@@ -63,6 +66,8 @@ class Job:
     tolerance: float = 1e-5
     estimate: bool = True
     signals: tuple[str, ...] = ()
+    keep: bool = True
+    extremes: tuple[str, ...] = ()
 
     def loaded(self) -> Scenario:
         """Return the scenario, read and checked; `InputError` says what is wrong with it."""
@@ -197,19 +202,24 @@ def _monolithic(job: Job, scenario: Scenario) -> Outcome:
         raise InputError(f'{scenario.path}: no monolithic solver for it; take solver = "coupled"')
     count = round(scenario.simulation.stop_time / job.interval)
     times = np.linspace(0.0, scenario.simulation.stop_time, max(count, 1) + 1)
-    if job.signals:  # a name that is wrong is said before minutes are spent
-        _kept(job, system, {"time": times, **monolithic.solve(problem, times[:1], estimate=False).signals})
+    if job.signals or job.extremes:  # a name that is wrong is said before minutes are spent
+        first = monolithic.solve(problem, times[:1], estimate=False).signals
+        _known(job, (*job.signals, *job.extremes), {"time": times, **first})
     solution = monolithic.solve(problem, times, job.tolerance, job.estimate)
     table = {"time": times, **solution.signals}
-    kept = _kept(job, system, table)
+    kept, fields = _kept(job, system, table), system.split(table)[0]
+    judged = system.safety(table, fields, solution.estimated_error)
     energy = audit.of_coupled(table, scenario.simulation.tolerances.values())
+    told = {*kept, *job.extremes}
     summary = {
         "solver": job.solver,
         "steps": solution.steps,
         "wall_s": solution.wall_s,
         "tolerance": solution.tolerance,
-        "estimated_error": {name: value for name, value in solution.estimated_error.items() if name in kept},
+        "estimated_error": {name: value for name, value in solution.estimated_error.items() if name in told},
         "energy": energy.content() if energy is not None else None,
+        **(judged.content() if judged is not None else NO_LANDING),
+        "extremes": {name: extremes(times, table, name) for name in _known(job, job.extremes, table)},
         **({"mesh": system.about(table)["mesh"]} if isinstance(scenario, LandingScenario) else {}),
     }
     return kept, summary
@@ -221,16 +231,24 @@ def _coupled(job: Job, scenario: Scenario) -> Outcome:
         raise KeyboardInterrupt
     if coupled.log.error is not None:
         raise RunError(str(coupled.log.error), coupled.log.error.time)
+    _known(job, job.extremes, coupled.table)
     return _kept(job, coupled.system, coupled.table), {"solver": job.solver, **result(coupled).summary}
 
 
 def _kept(job: Job, system: System, table: Table) -> Table:
+    if not job.keep:
+        return {}
     if not job.signals:
         return system.split(table)[1]
-    missing = [name for name in job.signals if name not in table]
+    return {name: table[name] for name in ("time", *_known(job, job.signals, table))}
+
+
+def _known(job: Job, names: tuple[str, ...], table: Table) -> tuple[str, ...]:
+    """Return `names`; `InputError` where one is no signal."""
+    missing = [name for name in names if name not in table]
     if missing:
         raise InputError(f"{job.scenario}: no signal {missing[0]!r}{nearest(missing[0], table)}")
-    return {name: table[name] for name in ("time", *job.signals)}
+    return names
 
 
 SOLVERS: dict[str, Callable[[Job, Scenario], Outcome]] = {"monolithic": _monolithic, "coupled": _coupled}

@@ -64,7 +64,7 @@ def summary(coupled: Coupled) -> dict[str, Any]:
         "estimate_failure": coupled.estimate_failure,
         "interface_balance": interface_balance(coupled.table, log.energy),
         "units": {"time": "s"} | {name: log.units[name] for name in coupled.table if name in log.units},
-        "extremes": {n: _extremes(log.time, coupled.table, n) for n in coupled.table if n != "time"},
+        "extremes": {n: extremes(log.time, coupled.table, n) for n in coupled.table if n != "time"},
     }
 
 
@@ -115,7 +115,7 @@ def unresolved(coupled: Coupled) -> list[dict[str, Any]]:
     return list(found.values())
 
 
-def _extremes(time: np.ndarray, table: Table, name: str) -> dict[str, float]:
+def extremes(time: np.ndarray, table: Table, name: str) -> dict[str, float]:
     """Return start, end, least and largest value; the largest within the macro steps where the table has it."""
     values, tops = table[name], table.get(f"{name}_max", table[name])
     low, high = int(np.argmin(values)), int(np.argmax(tops))

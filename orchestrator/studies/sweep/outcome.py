@@ -1,0 +1,117 @@
+"""What became of the runs of a sweep: a row of the table a run, and how probable it is that limits hold."""
+
+from __future__ import annotations
+
+from collections.abc import Iterator, Mapping, Sequence
+from dataclasses import asdict, dataclass
+from functools import cached_property
+from typing import Any
+
+from orchestrator.landing.safety import UNITS
+from orchestrator.runs.job import Done
+from orchestrator.studies.sweep import probability
+from orchestrator.studies.sweep.design import Row, bare, groups
+from orchestrator.studies.sweep.study import EXTREMES, Study
+
+ALL = "all"
+"""Limits together."""
+
+
+@dataclass(frozen=True)
+class Outcome:
+    """A run, and what is kept of it."""
+
+    row: Row
+    done: Done
+
+    @cached_property
+    def limits(self) -> Mapping[str, Mapping[str, Any]]:
+        """The limits that were judged, as in ``summary.json``."""
+        return {} if self.done.failure is not None else self.done.summary.get("limits", {})
+
+    @property
+    def safe(self) -> bool | None:
+        """Whether it is safe; None where that is not known: the run failed, or nothing was judged."""
+        return None if self.done.failure is not None else self.done.summary.get("safe")
+
+    def keeps(self, limit: str) -> bool | None:
+        """Return whether a limit is kept, or ``all``; None where that is not known."""
+        if limit == ALL:
+            return self.safe
+        judged = self.limits.get(limit)
+        return None if judged is None else judged["verdict"] == "kept"
+
+    @property
+    def margins(self) -> dict[str, float]:
+        """Margin of each limit as a share of the limit: 1 where nothing was used up, below 0 where it is exceeded."""
+        shares = {name: judged["share"] for name, judged in self.limits.items()}
+        return {name: -float("inf") if share is None else 1.0 - share for name, share in shares.items()}
+
+    @property
+    def binding(self) -> str:
+        """The limit with the least margin."""
+        return min(self.margins, key=lambda name: self.margins[name], default="")
+
+
+def cells(study: Study, outcome: Outcome) -> dict[str, Any]:
+    """Return a row of the table; None where something is not known."""
+    summary, margins = outcome.done.summary, outcome.margins
+    found: dict[str, Any] = {"run": outcome.row.number, **outcome.row.inputs}
+    if study.sample is not None:
+        found["scramble"] = outcome.row.block
+    found |= {
+        "safe": outcome.safe,
+        "least_margin": margins.get(outcome.binding),
+        "binding": outcome.binding,
+        "verdict": summary.get("safety", ""),
+    }
+    for name in UNITS:
+        judged = outcome.limits.get(name, {})
+        found |= {f"margin.{name}": margins.get(name), f"worst.{name}": judged.get("worst")}
+        found[f"error.{name}"] = judged.get("estimated_error")
+    found |= dict(_extremes(study, summary))
+    return found | {"failure": outcome.done.failure or "", "folder": outcome.done.job.key}
+
+
+def _extremes(study: Study, summary: Mapping[str, Any]) -> Iterator[tuple[str, Any]]:
+    """Yield least and largest value of the signals that are asked for, and their estimated error."""
+    errors = summary.get("estimated_error", {})
+    for name in EXTREMES if study.extremes is None else study.extremes:
+        extremes, error = summary.get("extremes", {}).get(name, {}), errors.get(name)
+        yield f"{name}.min", extremes.get("min")
+        yield f"{name}.max", extremes.get("max")
+        yield f"{name}.error", error.get("total") if isinstance(error, Mapping) else error
+
+
+# -- probability ------------------------------------------------------------------------------------------------
+
+
+@dataclass(frozen=True)
+class Chances:
+    """How probable it is that limits hold, for one combination of what varies; ``all`` of them, and each."""
+
+    where: Mapping[str, Any]
+    of: Mapping[str, probability.Probability]
+
+    def content(self) -> dict[str, Any]:
+        """Return what ``study.json`` says."""
+        return {"where": self.where, **{name: asdict(one) for name, one in self.of.items()}}
+
+
+def chances(study: Study, outcomes: Sequence[Outcome], looks: int = 1) -> list[Chances]:
+    """Return how probable it is that limits hold, for each combination of what varies; none without a sample."""
+    if study.sample is None or not outcomes:
+        return []
+    return [_chances(study, i, where, outcomes, looks) for i, where in enumerate(groups(study))]
+
+
+def _chances(study: Study, group: int, where: Mapping[str, Any], every: Sequence[Outcome], looks: int) -> Chances:
+    assert study.sample is not None
+    mine, independent = [o for o in every if o.row.group == group], study.sample.method == "random"
+    judged = [name for name in UNITS if any(name in o.limits for o in mine)]
+    blocks = [o.row.block for o in mine]
+    of = {
+        name: probability.probability([o.keeps(name) for o in mine], blocks, independent, looks)
+        for name in (ALL, *judged)
+    }
+    return Chances({key: bare(value) for key, value in where.items()}, of)

@@ -1,0 +1,255 @@
+"""The file of a sweep: a scenario, what is set for all runs, what varies, and what is drawn at random.
+
+title = "Where may it land?"
+scenario = "landing_200m_point9_physical"
+solver = "monolithic"
+
+[vary]
+"landing.position" = { from = 20.0, to = 100.0, count = 9 }
+robot = ["fptlir", "miniature"]
+
+[sample]
+method = "sobol"
+count = 640
+"cable.parameters.mass_damping" = { uniform = [0.01, 0.5] }
+"""
+
+from __future__ import annotations
+
+import hashlib
+import json
+from collections.abc import Iterator, Mapping
+from pathlib import Path
+from typing import Annotated, Any, Literal, Self
+
+import numpy as np
+from pydantic import Field, PrivateAttr, ValidationError, model_validator
+
+from orchestrator.catalogue.documents import is_whole, read
+from orchestrator.catalogue.quantities import complaints
+from orchestrator.coupling.errors import InputError, nearest
+from orchestrator.coupling.run.results import plain
+from orchestrator.landing.safety import UNITS
+from orchestrator.scenario.types import Count, Positive, Section
+from orchestrator.studies.reading import shipped
+from orchestrator.studies.sweep.distributions import WORDS, Distribution
+
+Settings = dict[str, Any]
+FEWEST_SCRAMBLES = 10
+"""Of which a t interval is taken."""
+EXTREMES = ("robot.roll", "robot.pitch", "robot.yaw", "robot.body.position.z", "cable.tension_mid")
+OWN_KEYS = ("method", "count", "seed", "scrambles", "stop_when")
+"""Of ``[sample]`` that are no parameters."""
+
+
+class Range(Section):
+    """`count` values from `low` to `high`, both included, in `unit`."""
+
+    model_config = Section.model_config | {"populate_by_name": True}
+
+    low: Annotated[float, Field(alias="from")]
+    high: Annotated[float, Field(alias="to")]
+    count: Annotated[int, Field(ge=2)]
+    scale: Literal["linear", "log"] = "linear"
+    unit: str = ""
+
+    @property
+    def values(self) -> list[Any]:
+        """The values, as a scenario takes them; digits that only rounding has made are left out."""
+        space = np.geomspace if self.scale == "log" else np.linspace
+        numbers = [float(f"{x:.12g}") for x in space(self.low, self.high, self.count)]
+        return [{"value": x, "unit": self.unit} for x in numbers] if self.unit else numbers
+
+    @model_validator(mode="after")
+    def _in_order(self) -> Self:
+        if not self.low < self.high:
+            raise ValueError(f"from {self.low:g} must lie below to {self.high:g}")
+        if self.scale == "log" and self.low <= 0.0:
+            raise ValueError(f'from {self.low:g} must be above 0 where scale = "log"')
+        return self
+
+
+Varied = Annotated[list[Any], Field(min_length=1)] | Range
+
+
+class Stop(Section):
+    """When enough is known: the interval is no wider than `half_width` to either side.
+
+    `of`: the probability that is meant: ``all`` limits, or one by its name.
+    """
+
+    half_width: Annotated[float, Field(gt=0.0, lt=0.5)]
+    of: str = "all"
+
+    @model_validator(mode="after")
+    def _known(self) -> Self:
+        if self.of not in ("all", *UNITS):
+            raise ValueError(f"of: no limit {self.of!r}{nearest(self.of, UNITS)}; there are all, {', '.join(UNITS)}")
+        return self
+
+
+class Sample(Section):
+    """What is drawn at random, and how.
+
+    Attributes
+    ----------
+    count : runs, at most, for each combination of what varies
+    scrambles : independent repetitions that Sobol and Latin hypercube consist of
+    stop_when : None: all are made
+    """
+
+    method: Literal["random", "latin_hypercube", "sobol"] = "random"
+    count: Count
+    seed: Annotated[int, Field(ge=0)] = 1
+    scrambles: Annotated[int, Field(ge=FEWEST_SCRAMBLES)] = FEWEST_SCRAMBLES
+    stop_when: Stop | None = None
+    distributions: Annotated[dict[str, Distribution], Field(min_length=1)]
+
+    @property
+    def block(self) -> int:
+        """Runs of one scramble."""
+        return 1 if self.method == "random" else self.count // self.scrambles
+
+    @model_validator(mode="after")
+    def _fits(self) -> Self:
+        if self.method == "random":
+            return self
+        if self.count % self.scrambles or self.block < 2:
+            cure = self.scrambles * max(2, round(self.count / self.scrambles))
+            raise ValueError(f"count = {self.count} is not {self.scrambles} scrambles of equal size; take {cure}")
+        if self.method == "sobol" and self.block & (self.block - 1):
+            low = 2 ** (self.block.bit_length() - 1)
+            few, many = self.scrambles * low, 2 * self.scrambles * low
+            raise ValueError(
+                f"count = {self.count} is not {self.scrambles} scrambles of a power of two; take {few} or {many}"
+            )
+        return self
+
+
+class Study(Section):
+    """A sweep, as it is read.
+
+    Attributes
+    ----------
+    set : values for all runs, by their keys
+    vary : of these, every combination is run; the keys ``scenario`` and ``robot`` are names of the catalogue, or paths
+    sample : None: nothing is drawn at random
+    interval, tolerance, estimate : of the monolithic solver, see `Job`
+    extremes : signals whose least and largest value are columns of the table; None: those of `EXTREMES` that there are
+    record : runs whose signals are kept: none, all, or their numbers
+    timeout : s that a run may take
+    """
+
+    title: str = ""
+    scenario: str = ""
+    solver: Literal["coupled", "monolithic"] = "coupled"
+    set: Settings = Field(default_factory=dict)
+    vary: dict[str, Varied] = Field(default_factory=dict)
+    sample: Sample | None = None
+    interval: Positive = 0.02
+    tolerance: Positive = 1e-5
+    estimate: bool = True
+    extremes: list[str] | None = None
+    record: Literal["none", "all"] | list[Count] = "none"
+    timeout: Positive | None = None
+    _path: Path = PrivateAttr(default=Path("study.toml"))
+
+    @property
+    def path(self) -> Path:
+        """The study's file."""
+        return self._path
+
+    @property
+    def name(self) -> str:
+        """The file's name without its ending."""
+        return self._path.stem
+
+    @property
+    def values(self) -> dict[str, list[Any]]:
+        """What varies: key → all its values."""
+        return {key: v.values if isinstance(v, Range) else v for key, v in self.vary.items()}
+
+    @property
+    def hash(self) -> str:
+        """What it is known by: a hash of all that it says."""
+        text = json.dumps(plain(self.model_dump()), sort_keys=True)
+        return hashlib.sha256(text.encode()).hexdigest()
+
+    @model_validator(mode="after")
+    def _whole(self) -> Self:
+        if not self.scenario and "scenario" not in self.vary:
+            raise ValueError('has no scenario; add scenario = "NAME" (see `orchestrator list`)')
+        if not self.vary and self.sample is None:
+            raise ValueError('has nothing that varies; add [vary], for instance "landing.position" = [20.0, 60.0]')
+        sampled = self.sample.distributions if self.sample is not None else {}
+        groups = (("set", self.set), ("vary", self.vary), ("sample", sampled))
+        for i, (name, keys) in enumerate(groups):
+            for other, theirs in groups[:i]:
+                if both := sorted(keys.keys() & theirs.keys()):
+                    raise ValueError(f"{both[0]} stands in [{other}] and in [{name}]; leave one of them out")
+        if named := sorted({"robot", "scenario"} & {*self.set, *sampled}):
+            raise ValueError(f"{named[0]} can stand in [vary] alone; a list of one value will do")
+        return self
+
+
+# -- reading ----------------------------------------------------------------------------------------------------
+
+
+def path_of(name: str) -> Path:
+    """Return the path of a study: that of a file, or of one that is shipped."""
+    folder = shipped().parent
+    beside = folder / f"{name}.toml"
+    if not name.endswith(".toml") and not Path(name).exists() and beside.is_file():
+        return beside
+    if not Path(name).is_file():
+        known = sorted(path.stem for path in folder.glob("*.toml"))
+        raise InputError(f"{name}: no such study{nearest(name, known)}; give a TOML file, or {', '.join(known)}")
+    return Path(name)
+
+
+def load_study(path: Path) -> Study:
+    """Read the study at `path`; `InputError` says all that is wrong with it."""
+    return study_of(read(path), path)
+
+
+def study_of(document: Mapping[str, Any], path: Path) -> Study:
+    """Return the study that `document` says, with paths relative to that of `path`."""
+    try:
+        study = Study.model_validate(_flattened(document))
+    except ValidationError as error:
+        problems = (str(one).replace("sample.distributions", "sample") for one in complaints(error, Study))
+        raise InputError(f"{path}: {_readable(problem)}" for problem in problems) from None
+    study._path = path
+    return study
+
+
+def _readable(problem: str) -> str:
+    """Return what is wrong without the names of our types."""
+    return problem.replace(".Range", "").replace(".list[any]", "").replace(".constrained-list", "")
+
+
+def _flattened(document: Mapping[str, Any]) -> dict[str, Any]:
+    """Return the document with keys in one piece: ``landing.position = …`` as ``"landing.position" = …``."""
+    found = dict(document)
+    for name in ("set", "vary"):
+        if isinstance(found.get(name), Mapping):
+            found[name] = dict(_leaves(found[name]))
+    sample = found.get("sample")
+    if isinstance(sample, Mapping):
+        own = {key: value for key, value in sample.items() if key in OWN_KEYS}
+        drawn = {key: value for key, value in sample.items() if key not in OWN_KEYS}
+        found["sample"] = {**own, "distributions": dict(_leaves(drawn))}
+    return found
+
+
+def _leaves(table: Mapping[str, Any], prefix: str = "") -> Iterator[tuple[str, Any]]:
+    for key, value in table.items():
+        if isinstance(value, Mapping) and not _is_value(value):
+            yield from _leaves(value, f"{prefix}{key}.")
+        else:
+            yield prefix + key, value
+
+
+def _is_value(table: Mapping[str, Any]) -> bool:
+    """Whether a table stands for one value, a range or a distribution, and is no table of names."""
+    return is_whole(dict(table)) or any(key in table for key in ("from", "to", "count", *WORDS))
