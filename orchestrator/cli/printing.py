@@ -283,8 +283,8 @@ def counting_bar(quiet: bool, what: str) -> Iterator[Callable[[int, int], None]]
 
     columns = (BarColumn(), MofNCompleteColumn(), TextColumn(what), TimeElapsedColumn(), TimeRemainingColumn())
     with Progress(*columns, console=Console(stderr=True)) as bars:
-        task = bars.add_task(what, total=None)
-        yield lambda done, of: bars.update(task, completed=done, total=of)
+        task = bars.add_task(what, total=None, visible=False)  # what is wrong with the input is said before
+        yield lambda done, of: bars.update(task, completed=done, total=of, visible=True)
 
 
 def complain_of(runs: Iterable[Run]) -> None:
