@@ -12,6 +12,7 @@ from matplotlib.axes import Axes
 from matplotlib.backends.backend_agg import FigureCanvasAgg
 from matplotlib.colors import TwoSlopeNorm
 from matplotlib.figure import Figure
+from matplotlib.image import AxesImage
 
 from orchestrator.coupling.run.results import replacing
 from orchestrator.report.style import BLACK, BLUE, GREY, STYLE, VERMILION
@@ -97,7 +98,7 @@ def _map(study: Study, outcomes: Sequence[Outcome], x: str, y: str) -> Figure:
     figure.colorbar(image, ax=axis, label="Least margin [% of the limit]")
     _outline(axis, grid)
     if margins.size <= MOST_CELLS:
-        _write_limits(axis, grid, margins)
+        _write_limits(axis, grid, image)
     axis.set_xticks(range(len(columns)), [_tick(value) for value in columns])
     axis.set_yticks(range(len(lines)), [_tick(value) for value in lines])
     axis.set_xlabel(_label(study, x))
@@ -119,10 +120,16 @@ def _outline(axis: Axes, grid: Sequence[Sequence[Cell]]) -> None:
         axis.plot([i - 1.5, i - 0.5], [j - 0.5] * 2, color=BLACK, linewidth=2.2, clip_on=False)
 
 
-def _write_limits(axis: Axes, grid: Sequence[Sequence[Cell]], margins: np.ndarray) -> None:
+def _write_limits(axis: Axes, grid: Sequence[Sequence[Cell]], image: AxesImage) -> None:
     """Write into each cell its margin and the limit that binds."""
     for j, row in enumerate(grid):
         for i, one in enumerate(row):
-            text = UNKNOWN if np.isnan(one.margin) else f"{margins[j, i]:.0f}\n{one.binding}"
-            dark = abs(margins[j, i]) > 65.0
-            axis.text(i, j, text, ha="center", va="center", fontsize=7, color="white" if dark else BLACK)
+            text = UNKNOWN if np.isnan(one.margin) else f"{100.0 * one.margin:.0f}\n{one.binding}"
+            shade = 1.0 if np.isnan(one.margin) else _brightness(image, 100.0 * one.margin)
+            axis.text(i, j, text, ha="center", va="center", fontsize=7, color="white" if shade < 0.5 else BLACK)
+
+
+def _brightness(image: AxesImage, margin: float) -> float:
+    """Return how bright a margin's colour is, from 0 to 1 (the weights of ITU-R BT.601)."""
+    red, green, blue, _ = image.to_rgba(np.array([np.clip(margin, -100.0, 100.0)]))[0]
+    return float(0.299 * red + 0.587 * green + 0.114 * blue)
