@@ -25,6 +25,7 @@ if TYPE_CHECKING:
         load_run,
         load_scenario,
         run,
+        sweep,
     )
 
 __all__ = [
@@ -38,6 +39,7 @@ __all__ = [
     "load_run",
     "load_scenario",
     "run",
+    "sweep",
 ]
 
 

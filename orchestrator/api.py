@@ -11,11 +11,11 @@ The command line is a thin layer over it. Everything here can be had from `orche
 from __future__ import annotations
 
 import warnings
-from collections.abc import Callable, Iterator, Sequence
+from collections.abc import Callable, Iterator, Mapping, Sequence
 from contextlib import contextmanager
 from dataclasses import dataclass, replace
 from pathlib import Path
-from typing import Any
+from typing import TYPE_CHECKING, Any
 
 from fmus.face.first_use import compile_modules
 from fmus.kernels.jit import COMPILATION
@@ -43,6 +43,9 @@ from orchestrator.scenario.read import load
 from orchestrator.scenario.settings import Set, texts
 from orchestrator.scenario.types import LandingScenario, Scenario, ScenarioNote
 
+if TYPE_CHECKING:
+    from orchestrator.studies.sweep.result import Sweep
+
 __all__ = [
     "Comparison",
     "InputError",
@@ -54,6 +57,7 @@ __all__ = [
     "load_run",
     "load_scenario",
     "run",
+    "sweep",
 ]
 
 Progress = Callable[[str, float, float], None]
@@ -157,6 +161,35 @@ def compare(
         with _directory(out, f"{first.name}-compare") as directory:
             found = _compared(_ready(first), variants, progress or _silent, directory)
             return found if directory is None else write_comparison(directory, found, _draw(pictures))
+
+
+def sweep(
+    study: Path | str | Mapping[str, Any],
+    *,
+    out: Path | str | None = None,
+    workers: int | None = None,
+    timeout: float | None = None,
+    progress: Callable[[int, int, int], None] | None = None,
+) -> Sweep:
+    """Run many landings in worker processes; what a sweep in `out` has made already is not made again.
+
+    A script calls it under ``if __name__ == "__main__":``, because workers read the script, too.
+
+    Parameters
+    ----------
+    study : path of a study file, name of a shipped one, or what would stand in the file
+    out : its folder; None: ``runs/sweep-STUDY``
+    workers : processes; None: one a processor
+    timeout : s that a run may take; None: the study's
+    progress : told how many runs are done, of how many, and how many failed
+
+    Raises
+    ------
+    InputError : the study is wrong, or `out` belongs to something else; nothing was run
+    """
+    from orchestrator.studies.sweep.result import run as run_all  # with what only studies need
+
+    return run_all(study, out, workers, timeout, progress or (lambda done, of, failed: None))
 
 
 def load_scenario(

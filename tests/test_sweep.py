@@ -1,12 +1,14 @@
 """A sweep: every run once, none lost, a row each; studies that cannot be are refused before anything is touched."""
 
 import csv
+import importlib.util
 import json
 import os
 import signal
 import subprocess
 import sys
 import time
+import tomllib
 from dataclasses import dataclass
 from multiprocessing import parent_process
 from pathlib import Path
@@ -14,6 +16,7 @@ from pathlib import Path
 import numpy as np
 import pytest
 
+import orchestrator
 from orchestrator.cli.commands import main
 from orchestrator.coupling.errors import InputError
 from orchestrator.runs.job import Job, make
@@ -266,3 +269,25 @@ def test_a_folder_of_something_else_is_left_alone(tmp_path: Path):
     with pytest.raises(InputError, match="is no folder"):
         write.place_of(out / "mine.txt", study)
     assert (out / "mine.txt").read_text(encoding="utf-8") == "mine"
+
+
+# -- in Python ------------------------------------------------------------------------------------------------------
+
+
+def test_a_sweep_in_python(tmp_path: Path, monkeypatch: pytest.MonkeyPatch):
+    monkeypatch.chdir(tmp_path)
+    counts: list[tuple[int, int, int]] = []
+    document = tomllib.loads(LANDING.replace("0.2", "0.1"))
+    found = orchestrator.sweep(document, workers=1, progress=lambda *now: counts.append(now))
+    assert found.directory.parent == Path("runs") and counts == [(1, 2, 0), (2, 2, 0)]
+    assert found.table["landing.position"].tolist() == [20.0, 60.0] and found.table["safe"].tolist() == [1.0, 1.0]
+    assert found.table["binding"].dtype == object and found.probability == []
+    assert found.safe_ranges == ["landing.position: safe from 20 to 60 m (2 values)"] and "2 safe" in repr(found)
+    (axis,) = found.map("landing.position").axes
+    assert axis.get_ylabel() == "Least margin [% of the limit]"
+    with pytest.raises(InputError, match="does not vary"):
+        found.map("landing.position", "robot.parameters.mass")
+    if importlib.util.find_spec("pandas"):
+        assert found.frame().shape == (2, len(found.table))
+    again = orchestrator.sweep(document)
+    assert again.directory == found.directory and again.counts == found.counts

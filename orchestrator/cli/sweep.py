@@ -31,7 +31,7 @@ def sweep(
     """
     with importing():
         from orchestrator.coupling.errors import DONE, MISSED
-        from orchestrator.studies.sweep import write
+        from orchestrator.studies.sweep import maps, write
         from orchestrator.studies.sweep.solve import sweep as run_all
         from orchestrator.studies.sweep.study import load_study, path_of
 
@@ -41,14 +41,19 @@ def sweep(
         found = run_all(read, folder / write.STORE, lambda swept: write.save(folder, swept), workers, timeout, told)
     _print(found)
     print(f"table in {folder / write.TABLE}")
+    for path in maps.write(folder, read, found.outcomes):
+        print(f"map in {path}")
     raise typer.Exit(MISSED if found.failed else DONE)
 
 
 def _print(found: Swept) -> None:
     """Print how many are safe, how probably, and which runs failed."""
     from orchestrator.studies.sweep import write
+    from orchestrator.studies.sweep.ranges import all_ranges
 
     print(write.said(found))
+    for line in all_ranges(found.study, found.outcomes):
+        print(line)
     if found.chances:
         printing.print_table(write.CHANCES, write.chance_rows(found))
     for outcome in found.failed:

@@ -79,14 +79,14 @@ def _value(number: float, unit: str) -> Any:
 def points(sample: Sample, first: int, end: int) -> Iterator[np.ndarray]:
     """Yield the points (block, d) of each scramble in the unit cube: each independent of all others."""
     dimension = len(sample.distributions)
+    if sample.method == "random":
+        drawn = np.random.default_rng(sample.seed).random((end, dimension))
+        yield from drawn[first:, None]
+        return
+    engine = qmc.Sobol if sample.method == "sobol" else qmc.LatinHypercube
     for i in range(first, end):
         generator = np.random.default_rng([sample.seed, i])
-        if sample.method == "random":
-            yield generator.random((1, dimension))
-        elif sample.method == "sobol":
-            yield qmc.Sobol(dimension, seed=generator).random(sample.block)  # type: ignore[call-arg]
-        else:
-            yield qmc.LatinHypercube(dimension, seed=generator).random(sample.block)  # type: ignore[call-arg]
+        yield engine(dimension, seed=generator).random(sample.block)  # type: ignore[call-arg]  # rng from SciPy 1.15 on
 
 
 def job(study: Study, row: Row) -> Job:

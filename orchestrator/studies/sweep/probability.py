@@ -18,7 +18,7 @@ from collections.abc import Sequence
 from dataclasses import dataclass
 
 import numpy as np
-from scipy import stats
+from scipy import special
 
 CONFIDENCE = 0.95
 
@@ -95,16 +95,17 @@ def _interval(values: np.ndarray, blocks: np.ndarray, independent: bool, alpha: 
 
 
 def clopper_pearson(hits: int, count: int, alpha: float) -> tuple[float, float]:
-    """Return the exact interval of a probability of which `count` independent trials have `hits`."""
-    found = stats.binomtest(hits, count).proportion_ci(1.0 - alpha, "exact")
-    return float(found.low), float(found.high)
+    """Return the exact interval of a probability: of `count` independent trials, `hits` came true."""
+    low = special.betaincinv(hits, count - hits + 1, 0.5 * alpha) if hits else 0.0
+    high = special.betaincinv(hits + 1, count - hits, 1.0 - 0.5 * alpha) if hits < count else 1.0
+    return float(low), float(high)
 
 
 def _of_scrambles(values: np.ndarray, blocks: np.ndarray, alpha: float) -> tuple[float, float]:
     """Return the t interval over the means of scrambles, not narrower than n samples can tell."""
     means = np.array([values[blocks == block].mean() for block in np.unique(blocks)])
     deviation = means.std(ddof=1) / np.sqrt(len(means))
-    half = stats.t.ppf(1.0 - 0.5 * alpha, len(means) - 1) * deviation
+    half = special.stdtrit(len(means) - 1, 1.0 - 0.5 * alpha) * deviation
     half = max(float(half), np.log(2.0 / alpha) / len(values))
     middle = float(values.mean())
     return max(0.0, middle - half), min(1.0, middle + half)

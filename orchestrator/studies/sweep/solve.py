@@ -14,7 +14,8 @@ from orchestrator.runs.batch import Batches
 from orchestrator.runs.job import Done, Job
 from orchestrator.studies.sweep import probability
 from orchestrator.studies.sweep.design import Row, job, rows
-from orchestrator.studies.sweep.outcome import ALL, Chances, Outcome, chances
+from orchestrator.studies.sweep.outcome import Chances, Outcome, chances
+from orchestrator.studies.sweep.ranges import all_ranges
 from orchestrator.studies.sweep.study import FEWEST_SCRAMBLES, Study
 
 Told = Callable[[int, int, int], None]
@@ -175,6 +176,6 @@ def describe(found: Swept) -> dict[str, Any]:
         "counts": found.counts,
         "failures": [{"run": o.row.number, "reason": o.done.failure} for o in found.failed],
         "probability": [one.content() for one in found.chances],
-        "of": ALL,
+        "safe_ranges": all_ranges(study, found.outcomes) if found.complete else [],
         "content": study.model_dump(by_alias=True, exclude_none=True),
     }
