@@ -23,7 +23,7 @@ from orchestrator.runs.job import Job, make
 from orchestrator.runs.job import found as find
 from orchestrator.studies.sweep import design, solve, write
 from orchestrator.studies.sweep.distributions import Distribution
-from orchestrator.studies.sweep.study import Study, load_study, study_of
+from orchestrator.studies.sweep.study import Study, load_study, path_of, study_of
 
 OSCILLATOR = """
 scenario = "oscillator"
@@ -291,3 +291,20 @@ def test_a_sweep_in_python(tmp_path: Path, monkeypatch: pytest.MonkeyPatch):
         assert found.frame().shape == (2, len(found.table))
     again = orchestrator.sweep(document)
     assert again.directory == found.directory and again.counts == found.counts
+
+
+# -- what is shipped --------------------------------------------------------------------------------------------------
+
+
+def test_a_cut_of_the_papers_points_and_masses(tmp_path: Path):
+    """Heavier is nearer to the limits; 100 kg at midspan goes beyond the clearance, which it nears by its weight alone."""
+    shipped = load_study(path_of("points_masses"))
+    assert shipped.name == "points_masses" and len(design.groups(shipped)) == 40
+    vary = {"landing.position": [100.0], "robot.parameters.mass": [10.0, 55.0, 100.0]}
+    cut = shipped.model_copy(update={"vary": vary, "set": {"simulation.stop_time": 2.0}})
+    found = run(cut, tmp_path / "out")
+    light, middle, heavy = found.outcomes
+    for name in ("z", "tension"):
+        assert light.margins[name] > middle.margins[name] > heavy.margins[name], name
+    assert [outcome.safe for outcome in found.outcomes] == [True, True, False]
+    assert heavy.binding == "z" and not found.failed
