@@ -1,4 +1,4 @@
-# make env | run | test | test-wheel | lint | docs | measure | verify | bench
+# make env | run | test | test-wheel | lint | docs | measure | reproduce | verify | bench
 # The interpreter is the first of PYTHON, python3, python3.13, python3.12, python3.11 that is 3.11 or newer.
 
 SHELL := /bin/bash
@@ -9,7 +9,7 @@ STAMP := $(VENV)/.installed
 
 export OPENBLAS_NUM_THREADS ?= 1
 
-.PHONY: env run test test-generic test-portable test-wheel lint docs measure verify bench clean
+.PHONY: env run test test-generic test-portable test-wheel lint docs measure reproduce verify bench clean
 
 env: $(STAMP)
 
@@ -65,6 +65,13 @@ docs: $(VENV)/.docs
 
 measure: env
 	$(BIN)/python docs/measured.py
+
+# the paper: what it leaves open, identified (half an hour; status 1 says what is doubtful), then claim by claim
+reproduce: env
+	@for study in points masses both; do \
+	  $(BIN)/orchestrator identify $$study --save studies/paper/identified/$$study.json || [ $$? -eq 1 ] || exit 1; \
+	done
+	$(BIN)/orchestrator reproduce
 
 verify: env
 	$(BIN)/python -m verification

@@ -87,12 +87,56 @@ def test_what_the_scenario_gives_stands_and_is_said(file: Path):
     )
 
 
+def child(file: Path, text: str) -> Path:
+    path = file.parent / "b.toml"
+    path.write_text(f'extends = "{file.name}"\n{text}\n', encoding="utf-8")
+    return path
+
+
+def stiffnesses(path: Path, *overrides: str) -> tuple[float, float]:
+    found = load(path, overrides).cable.parameters
+    return found["axial_stiffness"], found["bending_stiffness"]
+
+
+def test_a_set_named_later_wins_over_what_an_earlier_file_gave(file: Path):
+    """The rule of the contact: a later file or --set names the set anew; what stands beside its name wins over it."""
+    own = child(file, "cable.parameters.axial_stiffness = 1e7")
+    assert stiffnesses(own) == (1e7, 148.0)
+    assert stiffnesses(own, "cable.stiffness_set=metallic") == (1.54e7, 148.0)
+    assert (
+        "cable: axial_stiffness are those of jia2025_200m's set metallic"
+        in load(own, ["cable.stiffness_set=metallic"]).notes
+    )
+    both = ["cable.stiffness_set=metallic", "cable.parameters.axial_stiffness=2e7"]
+    assert stiffnesses(own, *both) == stiffnesses(own, *reversed(both)) == (2e7, 148.0)
+    later = own.rename(own.parent / "c.toml")
+    assert stiffnesses(child(later, 'cable.stiffness_set = "physical"')) == (2.03e7, 411.25)
+
+
+def test_another_conductor_brings_all_of_its_own(file: Path):
+    own = child(file, "cable.parameters = { axial_stiffness = 1e7, linear_density = 2.0 }")
+    found = load(own, ["cable.conductor=jia2025_rig"])
+    rig = load_conductor("jia2025_rig")
+    assert found.cable.parameters["linear_density"] == rig.linear_density.value
+    assert found.cable.parameters["axial_stiffness"] == rig.stiffness_sets["metallic"].axial_stiffness.value
+    assert "cable: linear_density are those of the conductor jia2025_rig" in found.notes
+    (file.parent / "mine.toml").write_text('extends = "jia2025_rig"\n', encoding="utf-8")
+    assert load(own, ["cable.conductor=mine.toml"]).cable.parameters == found.cable.parameters
+
+
+def test_a_set_without_conductor_leaves_the_stiffnesses(file: Path):
+    file.write_text(TEXT.replace('conductor = "jia2025_200m", ', ""), encoding="utf-8")
+    own = child(file, "cable.parameters.axial_stiffness = 1e7")
+    assert load(own, ["cable.stiffness_set=physical"]).cable.parameters["axial_stiffness"] == 1e7
+
+
 def test_wrong_names(file: Path):
     assert "cable.conductor: no conductor 'jia2025_200' in the catalogue; did you mean jia2025_200m?" in problem(
         file, ["cable.conductor=jia2025_200"]
     )
     wrong = problem(file, ["cable.stiffness_set=metalic"])
     assert "cable.stiffness_set: jia2025_200m has no set 'metalic'; did you mean metallic?" in wrong
+    assert len(problem(file, ["cable.stiffness_set=3"]).splitlines()) == 1
     file.write_text(TEXT.replace(', stiffness_set = "metallic"', ""), encoding="utf-8")
     assert "cable.stiffness_set: missing; jia2025_200m has table1, physical, metallic" in problem(file)
 

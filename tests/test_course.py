@@ -152,6 +152,17 @@ def followed(master, H, course=FORCE, steps=1, connected=True):
     return log.time, log.signal("a.position")
 
 
+def test_the_log_has_the_course_at_the_communication_points():
+    """Not the mean that the FMU was given; a jump belongs to the point that it lies at. By default, and if it is asked for."""
+    steps = Course([0.0, 0.3], [1.0, 5.0], "step")
+    for record in (None, ["b.position", "a.force", "a.position"]):
+        with Graph({"a": oscillator(), "b": oscillator("b")}, [], inputs={"a.force": steps}) as graph:
+            log = simulate(graph, "jacobi", 0.0, 0.5, 0.1, record)
+        np.testing.assert_array_equal(log.signal("a.force"), [1.0, 1.0, 1.0, 5.0, 5.0, 5.0])
+        assert log.units["a.force"] == "N" and "b.force" not in log.signals
+        assert log.signal("a.position")[-1] > log.signal("b.position")[-1] == 0.0
+
+
 USABLE = [name for name in MASTERS if name not in ("interface_jacobian", "reduced_interface")]
 
 

@@ -100,3 +100,18 @@ def test_the_same_seed_gives_the_same_answer():
     first, second = (fit(parameters, lambda p: decay(p) - decay(truth), Effort(profile=False)) for _ in range(2))
     assert first.values == second.values
     assert first.evaluations == second.evaluations
+
+
+def test_a_jump_beside_the_answer_does_not_hide_what_is_determined():
+    """The second of two residuals jumps by 7 just above the answer, as the time of the highest of two peaks may."""
+    truth = straight_line(np.array([[0.4, 0.2]]))
+
+    def residuals(points: np.ndarray) -> np.ndarray:
+        jump = np.where(points[:, :1] > 0.4 + 1e-5, 7.0, 0.0)
+        return np.hstack([straight_line(points) - truth, jump])
+
+    found = fit([Parameter("a", -1.0, 1.0), Parameter("b", -1.0, 1.0)], residuals, Effort(profile=False))
+    design = np.column_stack([np.ones_like(TIME), TIME])
+    deviation = np.sqrt(np.diag(np.linalg.inv(design.T @ design)))
+    assert [one.determined for one in found.estimates] == [True, True]
+    assert [one.deviation for one in found.estimates] == pytest.approx(deviation, rel=1e-6)

@@ -9,7 +9,9 @@ from pathlib import Path
 import numpy as np
 import pytest
 from scipy.integrate import solve_ivp
+from typer.testing import CliRunner
 
+from orchestrator.cli.commands import app
 from orchestrator.coupling.errors import InputError
 from orchestrator.landing import audit
 from orchestrator.landing import build as landing
@@ -103,7 +105,7 @@ def test_a_table_is_replaced_whole(tmp_path):
         ('{time=[0],value=[1],interpolation="cubic"}', "interpolation: 'cubic' must be 'linear' or 'step'"),
         ('{time=[0],value=[1],unit="kg"}', "kg"),
         ('{time=[0],value=[1],source="assumed"}', "what is assumed needs its reason"),
-        ('{file="none.csv"}', "none.csv: cannot be read as a table of inputs"),
+        ('{file="none.csv"}', "none.csv: cannot be read (No such file or directory); check the path"),
     ],
 )
 def test_wrong_tables_are_refused(value, said):
@@ -153,6 +155,25 @@ def test_books_balance_with_a_thrust_over_time(kinked):
     work = coupled.table["robot.control_work"][-1]
     assert abs(work) > 1.0
     assert work == pytest.approx(reference.signals["robot.control_work"][-1], rel=1e-3)
+
+
+def test_inputs_over_time_are_among_the_signals(kinked):
+    """The value of the table at each communication point, not the mean that the robot was given; one that is held is none."""
+    coupled, reference = kinked
+    time = coupled.table["time"]
+    for name in ("thrust", "torque.x"):
+        course = coupled.scenario.robot.inputs[name].course()
+        expected = [course.reached(t) for t in time]
+        for table in (coupled.table, reference.signals):
+            np.testing.assert_array_equal(table[f"robot.{name}"], expected)
+    after = np.searchsorted(time, 0.1234)
+    at = time[after]
+    assert coupled.table["robot.thrust"][after] == pytest.approx(
+        200.0 - 250.0 * (at - 0.1234) / (0.3017 - 0.1234), rel=1e-12
+    )
+    assert "robot.torque.y" not in coupled.table and "robot.torque.y" not in reference.signals
+    assert coupled.log.units["robot.thrust"] == "N" and coupled.log.units["robot.torque.x"] == "N.m"
+    assert reference.estimated_error["robot.thrust"] == 0.0
 
 
 def test_monolithic_steps_end_at_the_kinks():
@@ -224,6 +245,15 @@ def test_a_component_that_has_no_input_for_the_slope_is_named():
     assert not any("heat given" in note for note in notes)
 
 
+@pytest.mark.parametrize("command", ["run", "compare"])
+def test_a_robot_that_is_held_is_within(tmp_path, command):
+    """It does not move at all: its place has the error of the mesh, in proportion to the sag, and its energy round-off."""
+    found = CliRunner().invoke(app, [command, "rig_10m_setdown", "--stop", "0.1", "--out", str(tmp_path / "held")])
+    assert found.exit_code == 0, found.output
+    assert "the energy drifts" not in found.output
+    assert "MISSED" not in found.output
+
+
 # -- general graphs ----------------------------------------------------------------------------------------------
 
 
@@ -245,6 +275,7 @@ def test_a_component_of_a_graph_follows_a_table():
     for end in (0.777, 2.0):
         y, t = solve_ivp(rate, (t, end), y, "DOP853", rtol=1e-11, atol=1e-12).y[:, -1], end
     assert table["right.position"][-1] == pytest.approx(y[1], abs=1e-5)
+    np.testing.assert_array_equal(table["right.force"], [course.reached(t) for t in table["time"]])
     assert any("fed by" in p for p in _refused("components.left.inputs.force={time=[0],value=[1]}"))
 
 

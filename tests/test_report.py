@@ -293,6 +293,18 @@ def test_a_robot_that_never_touches_is_not_said_to_fly():
     assert flight(table | {"contact1.status": np.zeros(201)}) is None and flight({"time": TIME}) is None
 
 
+def test_inputs_that_vary_have_a_panel():
+    """One that keeps its value says nothing: its panel would be a line."""
+    ramp, held = np.linspace(300.0, 0.0, TIME.size), np.full(TIME.size, 2.0)
+    added = {"robot.thrust": ramp, "robot.torque.x": held, "robot.wheel[2].drive_torque": 0.1 * ramp}
+    shown = panels_for(landing(2) | added)[4:]
+    assert [(p.axis, list(p.lines)) for p in shown] == [
+        ("Thrust [N]", ["robot.thrust"]),
+        ("Drive torque [N m]", ["robot.wheel[2].drive_torque"]),
+    ]
+    assert words("robot.thrust") == "Thrust" and words("robot.torque.x") == "Torque"
+
+
 def test_signals_by_words():
     assert words("robot.roll") == "Roll" and words("cable.tension_mid") == "Cable tension" and words("a.b") == "a.b"
 

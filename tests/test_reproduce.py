@@ -77,6 +77,7 @@ WRONG = {
     "twice": ('id = "F12-zend"', 'id = "F12-z0"', "there is a claim of that id above; give it another id"),
     "part": ('parts = ["F14-order"', 'parts = ["F14-odrer"', "no claim 'F14-odrer'; did you mean F14-order?"),
     "key": ('what = "band of pitch over all points"', 'whta = "band"', "unknown key; did you mean what?"),
+    "finding": ("{F18-peak}", "{F18-peek}", "findings: no claim 'F18-peek'; did you mean F18-peak?"),
     "number": ("paper = -1.45", "paper = nan", "must be a finite number"),
     "two ways": ('id = "F12-z0"', 'id = "F12-z0"\nformula = "wheels"', "give one of measure, formula, parts or undecidable"),
     "no reason": ('reason = "yes or no"', "", "a tolerance needs its reason"),
@@ -236,7 +237,8 @@ def test_the_page_has_every_claim_figure_and_study(paper, whole, tmp_path: Path)
     assert all((tmp_path / name).stat().st_size < 100_000 for name in named)
     for title in ("Where the damping comes from", "Mesh and time step", "Set down or let go", "Sensitivity"):
         assert f"## {title}" in page
-    assert "nan" not in page and "failed" not in page
+    assert "## In short" in page and "{F" not in page
+    assert not re.search(r"\bnan\b", page) and "failed" not in page
 
 
 def test_what_cannot_hold_by_symmetry_is_told_by_the_runs(paper, whole):

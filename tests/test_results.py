@@ -17,6 +17,7 @@ from orchestrator.coupling.run.compare import communication_times, matching_rows
 from orchestrator.coupling.run.results import read_fields, read_json, read_table, replacing
 from orchestrator.runs.compare import Comparison, Reference, RunErrors
 from orchestrator.runs.directory import RunDirectory, claimed
+from orchestrator.runs.errors import CONSTANT, range_of
 from orchestrator.runs.reference import common_divisor
 
 
@@ -238,3 +239,11 @@ def test_comparison_json_has_the_agreed_keys_and_reads_back(directory: RunDirect
     assert set(content["runs"][0]) == keys | {"signals", "errors"}
     assert set(content["runs"][0]["signals"]["z"]) == {"max_error", "rms_error", "scale", "relative_max_error"}
     assert Comparison.from_content(content, found.reference.table).content() == found.content()
+
+
+def test_a_signal_that_does_not_move_is_judged_by_its_size():
+    """One that moves by its peak-to-peak, whatever its size."""
+    still, moving = np.full(3, -0.2), np.array([-20.0, -20.0 + 2e-6, -20.0])
+    assert range_of(still) == 0.2 and range_of(np.array([-0.2, -0.2 + 1e-16, -0.2])) == pytest.approx(0.2, rel=1e-12)
+    assert range_of(moving) == np.ptp(moving)
+    assert range_of(np.zeros(3)) == range_of(1e-20 * moving) == CONSTANT

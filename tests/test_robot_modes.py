@@ -167,6 +167,14 @@ def test_close_but_not_coupled():
     assert not of_scenario(scenario("rig_10m")).warnings
 
 
+def test_rest_is_that_under_the_thrust_which_a_course_ends_with():
+    """Set down by a thrust that falls to zero, the robot rests as without any; one that stays carries its part."""
+    plain, down = (at_rest(problem(name)) for name in ("rig_10m", "rig_10m_setdown"))
+    assert down.robot[:3] == pytest.approx(plain.robot[:3], abs=1e-9)
+    lifted = at_rest(problem("rig_10m", **{"robot.inputs.thrust": 100.0}))
+    assert lifted.robot[2] > plain.robot[2] + 1e-3
+
+
 def test_shares_and_modal_mass():
     found = of_scenario(scenario("rig_10m"))
     assert found.shares.sum(axis=1) == pytest.approx(1.0, abs=1e-12)

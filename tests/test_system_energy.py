@@ -40,6 +40,11 @@ def test_terms_and_sources_add_up():
     assert not books.within
     assert {name: values[-1] for name, values in books.sources.items() if values[-1]} == {"interface contact1": -1.0}
     assert "interface contact1" in books.warning()
+    held = {n: x if n == "time" else x[0] + 1e-3 * audit.ROUND_OFF * (x - x[0]) for n, x in table.items()}
+    for books in (audit.of_coupled(held, [0.01]), audit.of_monolithic(held, dict.fromkeys(held, 0.0))):
+        assert books.within and books.warning() is None  # round-off of the 15 J that are there at the start
+        assert books.allowed == pytest.approx(15.0 * audit.ROUND_OFF)
+        assert books.content()["relative_drift"] is None
 
 
 def test_a_component_that_does_not_show_its_energy_is_named(flagship):

@@ -7,9 +7,10 @@ from typing import Annotated
 
 from pydantic import BaseModel, ConfigDict, Field, PrivateAttr, ValidationError
 
+from orchestrator.catalogue import shelf
 from orchestrator.catalogue.documents import Stack, chain
 from orchestrator.catalogue.quantities import POSITIVE, Number, complaints, in_unit
-from orchestrator.coupling.errors import InputError, nearest
+from orchestrator.coupling.errors import InputError
 
 FOLDER = Path(__file__).parent / "conductors"
 
@@ -53,15 +54,15 @@ class ConductorSpec(Strict):
         """The conductor's file."""
         return self._path
 
-    def parameters(self, stiffness_set: str) -> dict[str, Number]:
-        """Return the cable's parameters by name, SI, with one of the sets of stiffnesses."""
+    @property
+    def parameters(self) -> dict[str, Number]:
+        """The cable's parameters by name, SI, that no set of stiffnesses changes."""
+        return {"diameter": self.diameter, "linear_density": self.linear_density}
+
+    def stiffnesses(self, stiffness_set: str) -> dict[str, Number]:
+        """Return the cable's parameters by name, SI, of one of the sets of stiffnesses."""
         chosen = self.stiffness_sets[stiffness_set]
-        return {
-            "diameter": self.diameter,
-            "linear_density": self.linear_density,
-            "axial_stiffness": chosen.axial_stiffness,
-            "bending_stiffness": chosen.bending_stiffness,
-        }
+        return {"axial_stiffness": chosen.axial_stiffness, "bending_stiffness": chosen.bending_stiffness}
 
 
 def load_conductor(name_or_path: str) -> ConductorSpec:
@@ -80,14 +81,9 @@ def load_conductor(name_or_path: str) -> ConductorSpec:
 
 def names() -> list[str]:
     """Return the names of the catalogue, whatever their files hold."""
-    return sorted(path.stem for path in FOLDER.glob("*.toml"))
+    return shelf.names(FOLDER)
 
 
 def _find(name_or_path: str, folder: Path) -> Path:
     """Return the file of a conductor; a path is relative to `folder`."""
-    if name_or_path.endswith(".toml"):
-        return folder / name_or_path
-    if name_or_path not in names():
-        hint = nearest(name_or_path, names()) or f"; choose {', '.join(names())}, or the path of a .toml file"
-        raise InputError(f"no conductor {name_or_path!r} in the catalogue{hint}")
-    return FOLDER / f"{name_or_path}.toml"
+    return shelf.find_or_path(FOLDER, name_or_path, "conductor", folder)

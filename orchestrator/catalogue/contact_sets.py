@@ -7,9 +7,10 @@ from typing import Annotated
 
 from pydantic import BaseModel, ConfigDict, Field, ValidationError
 
-from orchestrator.catalogue.documents import Document, read
+from orchestrator.catalogue import shelf
+from orchestrator.catalogue.documents import read
 from orchestrator.catalogue.quantities import SOURCED, Number, complaints
-from orchestrator.coupling.errors import InputError, nearest
+from orchestrator.coupling.errors import InputError
 
 FOLDER = Path(__file__).parent / "contacts"
 
@@ -26,15 +27,12 @@ class ContactSet(BaseModel):
 
 def names() -> list[str]:
     """Return the names of the sets."""
-    return sorted(path.stem for path in FOLDER.glob("*.toml"))
+    return shelf.names(FOLDER)
 
 
 def file_of(name: str) -> Path:
     """Return the file of a set; `InputError` names the nearest one."""
-    if name not in names():
-        hint = nearest(name, names()) or f"; choose {', '.join(names())}"
-        raise InputError(f"no stiffness set {name!r} of the contact{hint}")
-    return FOLDER / f"{name}.toml"
+    return shelf.find(FOLDER, name, f"stiffness set {name!r} of the contact")
 
 
 def load_set(name: str) -> ContactSet:
@@ -44,9 +42,3 @@ def load_set(name: str) -> ContactSet:
         return ContactSet.model_validate(read(path))
     except ValidationError as error:
         raise InputError(f"{path}: {one}" for one in complaints(error, ContactSet)) from None
-
-
-def parameters_of(name: str) -> Document:
-    """Return the contact's parameters that a set gives, as its file has them."""
-    load_set(name)
-    return read(file_of(name))["parameters"]

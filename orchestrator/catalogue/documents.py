@@ -31,6 +31,19 @@ def is_whole(value: Any) -> bool:
     return is_quantity(value) or is_over_time(value)
 
 
+def table_of(document: Document, key: str) -> Document:
+    """Return the table at `key`; an empty one where there is none."""
+    value = document.get(key)
+    return value if isinstance(value, dict) else {}
+
+
+def parameters_of(document: Document, key: str) -> Document | None:
+    """Return the parameters of a section, made where there are none; None if they are no table."""
+    section = document.get(key)
+    found = section.setdefault("parameters", {}) if isinstance(section, dict) else None
+    return found if isinstance(found, dict) else None
+
+
 @dataclass
 class Stack:
     """A document made of several: files that extend one another, then what the command line replaces.

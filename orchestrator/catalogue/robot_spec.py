@@ -10,6 +10,7 @@ import numpy as np
 from pydantic import BaseModel, ConfigDict, Field, PrivateAttr, ValidationError
 
 from fmus.module.units import convert
+from orchestrator.catalogue import shelf
 from orchestrator.catalogue.documents import Document, Stack, chain
 from orchestrator.catalogue.quantities import (
     ASSUMED,
@@ -22,7 +23,7 @@ from orchestrator.catalogue.quantities import (
     complaints,
     in_unit,
 )
-from orchestrator.coupling.errors import InputError, nearest
+from orchestrator.coupling.errors import InputError
 
 FOLDER = Path(__file__).parent / "robots"
 
@@ -221,22 +222,12 @@ def catalogue() -> dict[str, RobotSpec]:
 
 def names() -> list[str]:
     """Return the names of the catalogue, whatever their files hold."""
-    return sorted(path.stem for path in FOLDER.glob("*.toml"))
-
-
-def is_file(name_or_path: str) -> bool:
-    """Whether a robot is named by its file, and not by its name in the catalogue."""
-    return name_or_path.endswith(".toml")
+    return shelf.names(FOLDER)
 
 
 def _find(name_or_path: str, folder: Path) -> Path:
     """Return the file of a robot; a path is relative to `folder`."""
-    if is_file(name_or_path):
-        return folder / name_or_path
-    if name_or_path not in names():
-        hint = nearest(name_or_path, names()) or f"; choose {', '.join(names())}, or the path of a .toml file"
-        raise InputError(f"no robot {name_or_path!r} in the catalogue{hint}")
-    return FOLDER / f"{name_or_path}.toml"
+    return shelf.find_or_path(FOLDER, name_or_path, "robot", folder)
 
 
 def _parse(path: Path) -> RobotSpec:

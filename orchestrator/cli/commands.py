@@ -69,8 +69,6 @@ app = typer.Typer(
     "2 wrong input; 3 the run failed; 130 interrupted.",
 )
 app.add_typer(new.app, name="new")
-app.command()(identify)
-app.command()(sweep)
 
 
 def _print_version(asked: bool) -> None:
@@ -282,6 +280,10 @@ def reproduce(
     printing.print_reproduction(done)
     print(f"page in {done.page}, {done.wall_s:.0f} s")
     raise typer.Exit(done.exit_status)
+
+
+app.command()(identify)
+app.command()(sweep)
 
 
 @app.command()

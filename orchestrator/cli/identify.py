@@ -27,19 +27,22 @@ def identify(
     workers: Annotated[int | None, typer.Option(min=1, help="Processes. Default: one a processor.")] = None,
     quiet: options.Quiet = False,
 ) -> None:
-    """Find parameters from measurements, or from claims of the paper, and say how well these determine them.
+    """Find parameters from measurements or claims, and how well these determine them.
 
     An interrupted study goes on where it was. Exit status 1 where a parameter is not determined, or lies at a bound.
     """
     with importing():
         from orchestrator.coupling.errors import DONE, MISSED
         from orchestrator.coupling.run.results import write_json
+        from orchestrator.runs.directory import folder_for
         from orchestrator.studies.identification.solve import identify as find
         from orchestrator.studies.identification.study import load_study, path_of
         from orchestrator.studies.identification.write import STORE, content, place_of, write
 
     found_study = load_study(path_of(study))
     folder = place_of(out, found_study.name)
+    if save is not None:
+        folder_for(save.parent, "--save")
     with _search_line(quiet) as told:
         found = find(found_study, folder / STORE, workers, told)
     _print(found)

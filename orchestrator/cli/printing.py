@@ -206,7 +206,7 @@ def print_reproduction(found: Reproduction) -> None:
     judge = found.book.judged_by
     ours = [row.ours.get(judge) or next(iter(row.ours.values()), None) for row in found.rows]
     rows = (
-        (row.claim.id, number(row.claim.values), number(values, 3), row.claim.unit, row.verdict)
+        (row.claim.id, number(row.claim.values), number(values, 4), row.claim.unit, row.verdict)
         for row, values in zip(found.rows, ours, strict=True)
     )
     print_table(("claim", "paper", f"ours, {judge}", "unit", "verdict"), rows)
@@ -283,8 +283,8 @@ def counting_bar(quiet: bool, what: str) -> Iterator[Callable[[int, int], None]]
 
     columns = (BarColumn(), MofNCompleteColumn(), TextColumn(what), TimeElapsedColumn(), TimeRemainingColumn())
     with Progress(*columns, console=Console(stderr=True)) as bars:
-        task = bars.add_task(what, total=None)
-        yield lambda done, of: bars.update(task, completed=done, total=of)
+        task = bars.add_task(what, total=None, visible=False)  # what is wrong with the input is said before
+        yield lambda done, of: bars.update(task, completed=done, total=of, visible=True)
 
 
 def complain_of(runs: Iterable[Run]) -> None:

@@ -132,8 +132,10 @@ def read_columns(path: Path) -> tuple[list[float], dict[str, list[float]]]:
     try:
         with open(path, encoding="utf-8", newline="") as file:
             rows = [row for row in csv.reader(file) if row]
-    except (OSError, ValueError) as error:
-        raise InputError(f"{path}: cannot be read as a table of inputs: {error}") from None
+    except OSError as error:
+        raise InputError(f"{path}: cannot be read ({error.strerror}); check the path") from None
+    except ValueError as error:
+        raise InputError(f"{path}: cannot be read as a table of inputs: {error}; save it as UTF-8") from None
     names = [name.strip() for name in rows[0]] if rows else []
     if names[:1] != ["time"] or len(names) < 2:
         raise InputError(f'{path}: its first line must be a header: "time", then names of variables')

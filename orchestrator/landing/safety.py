@@ -323,7 +323,7 @@ def why_not_judged(safety: Mapping[str, Any]) -> Iterator[str]:
     yield from (f"{', '.join(names)} ({why})" for why, names in reasons.items())
 
 
-NOISE = 1e-12
+NOISE = 1e-9
 """Smaller values say nothing, in any unit."""
 HEAD = ("limit", "unit", "worst", "allowed", "margin", "at [s]", "wheel", "verdict")
 VERDICTS = {"kept": "kept", "unclear": "NOT CLEAR", "exceeded": "EXCEEDED"}

@@ -2,7 +2,8 @@
 
 from __future__ import annotations
 
-from collections.abc import Mapping
+import csv
+from collections.abc import Mapping, Sequence
 from pathlib import Path
 
 import numpy as np
@@ -27,24 +28,26 @@ def draw(directory: Path, position: float) -> list[Path]:
     ----------
     position : where the robot of the scenario lands, m
     """
-    shapes(directory / "modes.png", read_fields(directory / "modes.h5"), position)
+    with open(directory / "modes.csv", encoding="utf-8", newline="") as file:
+        kinds = [row["kind"] for row in csv.DictReader(file)]
+    shapes(directory / "modes.png", read_fields(directory / "modes.h5"), position, kinds)
     if not (directory / "positions.csv").is_file():
         return [directory / "modes.png"]
     resonance(directory / "positions.png", read_table(directory / "positions.csv"), position)
     return [directory / "modes.png", directory / "positions.png"]
 
 
-def shapes(path: Path, modes: Mapping[str, np.ndarray], position: float) -> Figure:
-    """Draw the motion of the line in each mode over the span, with the place of the robot."""
+def shapes(path: Path, modes: Mapping[str, np.ndarray], position: float, kinds: Sequence[str]) -> Figure:
+    """Draw the motion of the line in each mode over the span, with the place of the robot; `kinds` names the modes."""
     count, y = min(SHOWN, modes["frequency"].size), modes["equilibrium"][:, 1]
     with saved(path, (6.0, 0.75 * count + 0.7)) as figure:
         axes = figure.subplots(count, 1, sharex=True, squeeze=False)[:, 0]
-        for axis, shape, frequency in zip(axes, modes["line.real"], modes["frequency"], strict=False):
+        for axis, shape, frequency, kind in zip(axes, modes["line.real"], modes["frequency"], kinds, strict=False):
             for direction, colour, label in DIRECTIONS:
                 axis.plot(y, shape[:, direction] / np.abs(shape).max(), color=colour, label=label)
             axis.axvline(position, color=GREY, linewidth=0.8)
             axis.set_ylim(-1.15, 1.15)
-            axis.set_yticks([0.0], [f"{frequency:.4g} Hz" if frequency > 0.0 else "topples"])
+            axis.set_yticks([0.0], [f"{kind}\n{frequency:.4g} Hz" if frequency > 0.0 else f"{kind}\ntopples"])
         axes[-1].set_xlabel("Position along the span [m]")
         axes[0].legend(loc="upper right", ncols=len(DIRECTIONS))
     return figure

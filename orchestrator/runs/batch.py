@@ -101,7 +101,9 @@ class Batches:
             compile_modules()
         pool, alone = self._started(), _first_of_its_kind(left)
         for keys, limit in ((alone, None), ([key for key in left if key not in alone], self.timeout)):
-            futures = {pool.schedule(make, args=(left[key], self.store), timeout=limit): key for key in keys}
+            futures: dict[Future[None], str] = {
+                pool.schedule(make, args=(left[key], self.store), timeout=limit): key for key in keys
+            }
             for future in as_completed(futures):
                 key = futures[future]
                 yield key, _ended(left[key], self.store, future)

@@ -18,7 +18,7 @@ from orchestrator.coupling.run.compare import (
 from orchestrator.coupling.run.results import Table
 from orchestrator.landing.audit import Audit, of_monolithic
 from orchestrator.landing.intervals import coarsened
-from orchestrator.runs.errors import CONSTANT, Parts, differences, judged, left_out
+from orchestrator.runs.errors import Parts, differences, judged, left_out, range_of
 from orchestrator.runs.result import EXIT_STATUS, Run, Verdict, pandas_module, run_label
 
 SAFETY = ("safe", "safety", "limits", "not_judged")
@@ -228,7 +228,7 @@ def _check(run: RunErrors, signal: str, tolerance: float, reference: Reference) 
         note = "not among the signals of run and reference"
         return Check(run.master, run.macro_step, signal, float("nan"), tolerance, False, note)
     parts = run.errors.get(signal) or Parts(error.max_error, None, None, error.max_error)
-    scale = max(error.scale, CONSTANT)
+    scale = range_of(reference.table[signal], error.scale)
     value, own, note = parts.total / scale, reference.estimated_error.get(signal), ""
     if own is None:
         note = "the reference does not say how accurate it is"

@@ -51,14 +51,15 @@ def master_of(scenario: Scenario, graph: Graph) -> Master:
 
 
 def recorded(graph: Graph) -> list[str]:
-    """Return the signals worth keeping: outputs, without unused ports and what only serves the coupling."""
+    """Return the signals worth keeping: outputs, without unused ports and what only serves the coupling; inputs over time."""
     contacts = sum(name.startswith("contact") for name in graph.components)
-    return [
+    outputs = [
         f"{component}.{name}"
         for component, fmu in graph.components.items()
         for name, port in fmu.ports.items()
         if port.causality == "output" and port.is_number and not is_idle(name, contacts)
     ]
+    return [*outputs, *graph.courses]
 
 
 def is_idle(name: str, contacts: int) -> bool:

@@ -87,6 +87,15 @@ def claimed(out: Path | str | None, name: str) -> Iterator[RunDirectory]:
         directory.discard()
 
 
+def folder_for(path: Path, option: str) -> Path:
+    """Make the folder `path` that results will be written to, before they are; `InputError` where that cannot be."""
+    try:
+        path.mkdir(parents=True, exist_ok=True)
+    except OSError as error:
+        raise InputError(f"{option} {path}: cannot be made a folder ({error.strerror}); choose another") from None
+    return path
+
+
 def circumstances() -> dict[str, Any]:
     """Return what a run depends on beside its scenario: versions, commit, platform, date."""
     return {

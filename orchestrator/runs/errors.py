@@ -13,8 +13,8 @@ from orchestrator.coupling.run.compare import matching_rows
 from orchestrator.coupling.run.results import Table
 
 CONSTANT = 1e-6
-"""A signal that moves by less than this (m, rad …) counts as constant: errors are then held against this range, as for
-the roll of a landing at midspan, which is zero by symmetry."""
+"""A signal that moves by less than this (m, rad …) counts as constant, as the roll of a landing at midspan, which is zero
+by symmetry."""
 PEAK = re.compile(r"contact\d+\.normal_force_max")
 """Signals whose largest value over the run has an error of its own; elsewhere it is the largest difference over time."""
 
@@ -83,9 +83,19 @@ class Parts:
         return cls(**values, total=nan if total is None else total)
 
 
-def range_of(values: np.ndarray) -> float:
-    """Return the peak-to-peak of a signal, in its unit, or that of one that counts as constant."""
-    return max(float(np.ptp(values)), CONSTANT)
+def range_of(values: np.ndarray, moved: float | None = None) -> float:
+    """Return what errors of a signal are held against, in its unit: its peak-to-peak.
+
+    A constant one has no range. What error it has goes with its size: a mesh leaves 5 nm in the place of the rig's line at
+    rest, 2e-8 of the sag. So it is held against that size; or against `CONSTANT`, if that is zero as well.
+
+    Parameters
+    ----------
+    values : (n,)
+    moved : its peak-to-peak, if that is known otherwise
+    """
+    moved = float(np.ptp(values)) if moved is None else moved
+    return moved if moved > CONSTANT else max(float(np.max(np.abs(values))), CONSTANT)
 
 
 def missed(parts: Mapping[str, Parts], tolerances: Mapping[str, float], table: Mapping[str, np.ndarray]) -> list[str]:

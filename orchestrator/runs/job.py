@@ -21,7 +21,8 @@ import numpy as np
 from fmus.kernels.jit import VERSIONS, sources
 from fmus.module.variables import ModuleError
 from orchestrator.catalogue import documents
-from orchestrator.catalogue.robot_spec import is_file, load_robot
+from orchestrator.catalogue.robot_spec import load_robot
+from orchestrator.catalogue.shelf import is_file
 from orchestrator.coupling.errors import InputError, RunError, nearest
 from orchestrator.coupling.run.interrupt import Interruption
 from orchestrator.coupling.run.results import Table, plain, read_json, read_table

@@ -12,7 +12,7 @@ from fmus.module import registry
 from fmus.module.units import UnitError, convert
 from fmus.module.variables import Variable
 from orchestrator.catalogue import modules as vocabulary
-from orchestrator.catalogue.documents import Document
+from orchestrator.catalogue.documents import Document, table_of
 from orchestrator.catalogue.quantities import Complaint, Scalar
 from orchestrator.coupling.errors import InputError, digits, nearest
 from orchestrator.coupling.masters.options import master_options, out_of_bounds
@@ -45,7 +45,7 @@ def _sections(document: Document) -> Iterator[tuple[str, str, Document]]:
     for kind in ("cable", "robot", "contact"):
         if isinstance(document.get(kind), dict):
             yield kind, kind, document[kind]
-    for name, section in _table(document, "components").items():
+    for name, section in table_of(document, "components").items():
         if isinstance(section, dict):
             yield f"components.{name}", "", section
 
@@ -116,7 +116,7 @@ def check(document: Document, known: Known) -> Iterator[Complaint]:
 def _section_problems(path: str, section: Document, known: Mapping[str, Variable]) -> Iterator[Complaint]:
     for group, causality in GROUPS.items():
         names = [v.name for v in known.values() if v.causality == causality]
-        for name, value in _table(section, group).items():
+        for name, value in table_of(section, group).items():
             place = f"{path}.{group}.{name}"
             if name in names:
                 yield from _value_problems(place, known[name], value)
@@ -145,7 +145,7 @@ def _value_problems(path: str, variable: Variable, value: Any) -> Iterator[Compl
 
 def _master_problems(document: Document) -> Iterator[Complaint]:
     """Yield a master that does not exist, and options that it does not have or that are out of bounds."""
-    name, options = _table(document, "simulation").get("master", DEFAULT_MASTER), _table(document, "master")
+    name, options = table_of(document, "simulation").get("master", DEFAULT_MASTER), table_of(document, "master")
     masters = master_options()
     if isinstance(name, str) and name not in masters:
         yield Complaint("simulation.master", f"no master {name!r}{nearest(name, masters)}")
@@ -166,7 +166,7 @@ def _is_like(value: Any, default: Any) -> bool:
 
 
 def _step_problems(document: Document) -> Iterator[Complaint]:
-    simulation = _table(document, "simulation")
+    simulation = table_of(document, "simulation")
     stop, step = simulation.get("stop_time"), simulation.get("macro_step")
     if not (_is_number(stop) and _is_number(step) and 0.0 < step < float("inf") and 0.0 < stop < float("inf")):
         return
@@ -184,8 +184,8 @@ def _is_number(value: Any) -> TypeGuard[float]:
 
 
 def _position_problems(document: Document, known: Known) -> Iterator[Complaint]:
-    position, cable = _table(document, "landing").get("position"), _table(document, "cable")
-    span = _table(cable, "parameters").get("span")
+    position, cable = table_of(document, "landing").get("position"), table_of(document, "cable")
+    span = table_of(cable, "parameters").get("span")
     if span is None and "fmu" not in cable and "cable" in known:
         span = known["cable"]["span"].start
     if _is_number(position) and _is_number(span) and 0 < span < float("inf") and not 0 < position < span:
@@ -194,15 +194,10 @@ def _position_problems(document: Document, known: Known) -> Iterator[Complaint]:
 
 def _limit_problems(document: Document) -> Iterator[Complaint]:
     """Yield limits that lack what they are counted by."""
-    limits = _table(document, "limits")
+    limits = table_of(document, "limits")
     if _is_number(limits.get("tension")) and "rated_strength" not in limits:
         cure = "give limits.rated_strength as well, or a conductor that has one"
         yield Complaint("limits.tension", f"is a share of the rated tensile strength; {cure}")
     for here, there in (SPACING, SPACING[::-1]):
         if here in limits and there not in limits:
             yield Complaint(f"limits.{here}", f"says nothing without limits.{there}; give both")
-
-
-def _table(document: Document, key: str) -> Document:
-    value = document.get(key)
-    return value if isinstance(value, dict) else {}

@@ -8,12 +8,12 @@ from collections.abc import Iterable, Iterator
 from pathlib import Path
 from typing import Any
 
-from orchestrator.catalogue import robot_spec
-from orchestrator.catalogue.documents import Document, Stack, chain, is_over_time, is_quantity, is_whole, leaves
+from orchestrator.catalogue import shelf
+from orchestrator.catalogue.documents import Document, Stack, chain, is_over_time, is_quantity, is_whole, leaves, merged
 from orchestrator.catalogue.scenarios import find
 from orchestrator.coupling.errors import InputError
 from orchestrator.coupling.masters.options import master_options
-from orchestrator.scenario import contact_set
+from orchestrator.scenario.named_sets import make_room
 from orchestrator.scenario.types import DEFAULT_MASTER
 
 NAMED_TABLES = ("parameters", "inputs", "tolerances")
@@ -47,7 +47,7 @@ def lay(stack: Stack, above: Document, place: str) -> list[str]:
     master = bare(simulation.get("master")) if isinstance(simulation, dict) else None
     if isinstance(master, str):
         _make_room_for_master(stack.document, master)
-    notes += contact_set.make_room(stack.document, above)
+    notes += make_room(stack.document, above)
     stack.put(above, place)
     return notes
 
@@ -137,7 +137,7 @@ def resolve_paths(document: Document, folder: Path) -> None:
         section = _table(document, place) or {}
         for key in ("fmu", "model", "conductor"):
             text = bare(section.get(key))
-            if isinstance(text, str) and (key == "fmu" or robot_spec.is_file(text)):
+            if isinstance(text, str) and (key == "fmu" or shelf.is_file(text)):
                 path = str((folder / text).absolute())
                 section[key] = section[key] | {"value": path} if is_quantity(section[key]) else path
         for name, value in (_table(section, ("inputs",)) or {}).items():
@@ -162,25 +162,42 @@ def replace_master(stack: Stack, master: str) -> None:
     lay(stack, {"simulation": {"master": master}}, "--master")
 
 
-def override(stack: Stack, texts: Iterable[str]) -> list[str]:
-    """Write each ``key=value`` into the document; return what is to be said of it."""
-    notes: list[str] = []
-    for text in texts:
-        path, equals, value = (part.strip() for part in text.partition("="))
-        if not (path and equals and value):
-            raise InputError(f"{SET} {text}: write key=value, for instance robot.parameters.mass=12")
-        *tables, last = _keys(path)
+def override(stack: Stack, texts: Iterable[str], folder: Path) -> list[str]:
+    """Write each ``key=value`` into the document; return what is to be said of it.
+
+    Together they are one file, the last; `folder` is what paths in them are relative to.
+    """
+    parsed = [_parsed(text) for text in texts]
+    together: Document = {}
+    for _, tables, given in parsed:
+        together = merged(together, _within(tables, given))
+    resolve_paths(together, folder)
+    notes = make_room(stack.document, together)
+    for text, tables, given in parsed:
         table = stack.document
         for key in tables:
             table = table.setdefault(key, {})
             if not isinstance(table, dict):
                 raise InputError(f"{SET} {text}: {key} is a value and has no keys below it")
-        given = named_tables({last: _toml_value(value, text)})
-        if path == contact_set.PLACE:
-            notes += contact_set.make_room(stack.document, {"contact": given})
         table |= given
-        stack.note(SET, [path, *leaves(given, "".join(f"{key}." for key in tables))])
+        prefix = "".join(f"{key}." for key in tables)
+        stack.note(SET, [prefix + next(iter(given)), *leaves(given, prefix)])
     return notes
+
+
+def _parsed(text: str) -> tuple[str, list[str], Document]:
+    """Return a ``key=value``, the tables that it goes through, and the last key with its value."""
+    path, equals, value = (part.strip() for part in text.partition("="))
+    if not (path and equals and value):
+        raise InputError(f"{SET} {text}: write key=value, for instance robot.parameters.mass=12")
+    *tables, last = _keys(path)
+    return text, tables, named_tables({last: _toml_value(value, text)})
+
+
+def _within(tables: list[str], given: Document) -> Document:
+    for key in reversed(tables):
+        given = {key: given}
+    return given
 
 
 def _keys(path: str) -> list[str]:

@@ -9,16 +9,16 @@ from pathlib import Path
 
 from pydantic import ValidationError
 
-from orchestrator.catalogue import robot_spec
+from orchestrator.catalogue import shelf
 from orchestrator.catalogue.documents import Document, Stack, is_over_time, is_quantity
 from orchestrator.catalogue.quantities import Complaint, complaints, quantity_complaints
 from orchestrator.catalogue.scenarios import find
 from orchestrator.coupling.errors import InputError
 from orchestrator.scenario import layers
 from orchestrator.scenario.check import check, known_variables, to_si
-from orchestrator.scenario.conductor import fill_line
-from orchestrator.scenario.contact_set import fill_in
+from orchestrator.scenario.conductor import fill_strength, share_diameter
 from orchestrator.scenario.inertia import scale_inertia
+from orchestrator.scenario.named_sets import fill_in
 from orchestrator.scenario.over_time import parse
 from orchestrator.scenario.types import GraphScenario, LandingScenario, Provenance, Scenario
 
@@ -47,20 +47,21 @@ def load(
         notes += layers.replace_robot(stack, robot)
     if master is not None:
         layers.replace_master(stack, master)
-    notes += layers.override(stack, overrides)
+    notes += layers.override(stack, overrides, path.parent)
     layers.resolve_paths(stack.document, path.parent)
-    problems: list[Complaint] = fill_in(stack)
+    problems: list[Complaint] = []
     provenance: dict[str, Provenance] = {}
     plain = _unwrap(stack, stack.document, "", provenance, problems)
     layers.resolve_paths(plain, path.parent)
     if "cable" in plain:
         plain.setdefault("contact", {})  # it shares the line's diameter
     known, unknown = known_variables(plain)
-    problems += [*unknown, *to_si(plain, known, provenance)]
-    said, wrong = fill_line(plain, known, provenance)
+    said, wrong = fill_in(plain, known, stack, provenance)
+    fill_strength(plain, provenance)
+    problems += [*unknown, *wrong, *to_si(plain, known, provenance), *share_diameter(plain, known, provenance)]
     notes += [*said, *scale_inertia(plain, provenance)]
     scenario, invalid = _validated(plain)
-    problems += [*wrong, *invalid, *check(plain, known)]
+    problems += [*invalid, *check(plain, known)]
     if problems or scenario is None:
         raise InputError(f"{stack.place_of(problem.path)}: {problem}" for problem in problems)
     return scenario.read_from(path, _with_robot_file(plain, provenance), notes)
@@ -118,7 +119,7 @@ def _with_what_is_missing(found: Iterable[Complaint]) -> Iterator[Complaint]:
 def _with_robot_file(plain: Document, provenance: dict[str, Provenance]) -> dict[str, Provenance]:
     """Return `provenance` with the hash of the robot's file, where the robot is one of its own."""
     model = plain.get("robot", {}).get("model")
-    if model is None or not robot_spec.is_file(model):
+    if model is None or not shelf.is_file(model):
         return provenance
     sha256 = hashlib.sha256(Path(model).read_bytes()).hexdigest()
     return provenance | {"robot.model": replace(provenance["robot.model"], sha256=sha256)}

@@ -79,7 +79,7 @@ class CableSection(Section):
     """The cable: parameters by their names in the contract; `fmu` is a foreign one instead of ours.
 
     `conductor` is one of the catalogue, or a TOML file like those there; `stiffness_set` one of its sets. Without a
-    conductor the latter is a label. What `parameters` give themselves stands.
+    conductor the latter is a label. What `parameters` of the same file give wins.
     `steps`, here and below: steps that the FMU makes in each step of the master (docs/reference/masters.md).
     """
 
@@ -112,7 +112,7 @@ class RobotSection(Section):
 class ContactSection(Section):
     """The wheel contact; one instance a wheel is made from it.
 
-    `stiffness_set` : a set of the catalogue; its parameters are those that the scenario does not give itself
+    `stiffness_set` : a set of the catalogue; what `parameters` of the same file give wins over it
     """
 
     fmu: str | None = None

@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+import re
 from collections.abc import Iterable
 from dataclasses import dataclass
 from pathlib import Path
@@ -14,6 +15,8 @@ from orchestrator.scenario.types import Section
 
 Settings = dict[str, Any]
 Value = float | list[float]
+PLACE = re.compile(r"\{([\w-]+)(?::(\w+))?\}")
+"""Where a finding has ours of a claim, and of which set."""
 Positive = Annotated[float, Field(gt=0.0)]
 NonNegative = Annotated[float, Field(ge=0.0)]
 
@@ -146,11 +149,16 @@ class Claim(Section):
 
 
 class Claims(Section):
-    """``claims.toml``. `judged_by`: the set that decides whether a claim is met."""
+    """``claims.toml``. `judged_by`: the set that decides whether a claim is met.
+
+    `findings`: what the page begins with; in them ``{F19-z}`` stands for ours of that claim with the judged set,
+    ``{F19-z:table1}`` with another.
+    """
 
     title: str
     judged_by: str
     reason: str
+    findings: list[str] = Field(default_factory=list)
     claim: Annotated[list[Claim], Field(min_length=1)]
 
 

@@ -212,8 +212,8 @@ def rig(figure: Figure, book: Book) -> None:
     ]
     axes = four(figure, curves)
     axes[0].set_ylabel("Z since release [m]")
-    for axis, level in zip(axes[:3], (0.1, 0.3, 2.5), strict=True):
-        middle = axis.lines[0].get_ydata()[-1] if axis is axes[0] and axis.lines else 0.0  # type: ignore[index]
+    rest = curves[0][1][Z][-1] if curves[0][1] is not None else 0.0
+    for axis, middle, level in zip(axes[:3], (rest, 0.0, 0.0), (0.1, 0.3, 2.5), strict=True):
         for sign in (-1.0, 1.0):
             axis.axhline(middle + sign * level, **DASHED)
     for axis in axes:
@@ -228,7 +228,7 @@ def rig_force(figure: Figure, book: Book) -> None:
         curve(axis, book.table("rig_level", name), FORCE, "1", label=name, **styled(i))
     for level in (380.0, 400.0):
         axis.axhline(level, **DASHED)
-    axis.set_xlim(0.0, 10.0)
+    axis.set_xlim(0.0, 5.0)
     axis.set_ylabel("Resultant of both walls [N]")
     finish(figure, [axis], "Time [s]")
 

@@ -15,6 +15,8 @@ from scipy.optimize import OptimizeResult, differential_evolution, least_squares
 
 STEP = 1e-3
 """Step of the central differences, as a share of the range between the bounds."""
+JUMP = 3.0
+"""Ratio of the differences to either side beyond which one of them holds a jump."""
 FAILED = 1e6
 """Residual of what cannot be calculated: far worse than any landing, and still a number that a search can compare."""
 AT_BOUND = 1e-3
@@ -137,15 +139,24 @@ class _Space:
         return self(share[None, :])[0]
 
     def slopes(self, share: np.ndarray, free: np.ndarray) -> np.ndarray:
-        """Return d residual / d share (k, m) of the parameters `free`, by central differences within the bounds."""
+        """Return d residual / d share (k, m) of the parameters `free`, by differences within the bounds.
+
+        Central ones; but a residual may jump, as the time of the highest of several peaks does. Where the differences to
+        either side are far apart, the smaller one is the slope, and the other holds a jump.
+        """
         low = np.tile(share, (free.size, 1))
         high = low.copy()
         rows = np.arange(free.size)
         low[rows, free] = np.maximum(share[free] - STEP, 0.0)
         high[rows, free] = np.minimum(share[free] + STEP, 1.0)
-        found = self(np.vstack([low, high]))
-        width = (high - low)[rows, free]
-        return ((found[free.size :] - found[: free.size]) / width[:, None]).T
+        found = self(np.vstack([share[None, :], low, high]))
+        here, before, after = found[0], found[1 : free.size + 1], found[free.size + 1 :]
+        left, right = (share - low)[rows, free][:, None], (high - share)[rows, free][:, None]
+        back = np.divide(here - before, left, out=np.full_like(before, np.inf), where=left > 0.0)
+        ahead = np.divide(after - here, right, out=np.full_like(after, np.inf), where=right > 0.0)
+        smaller = np.where(np.abs(back) < np.abs(ahead), back, ahead)
+        apart = np.maximum(np.abs(back), np.abs(ahead)) > JUMP * np.abs(smaller)
+        return np.where(apart, smaller, (after - before) / (left + right)).T
 
 
 def fit(

@@ -2,10 +2,12 @@
 
 from __future__ import annotations
 
+import re
 from collections.abc import Iterable, Sequence
 
 from orchestrator.studies import identified, referee
 from orchestrator.studies.book import Book
+from orchestrator.studies.documents import PLACE
 from orchestrator.studies.markdown import filled, number, table
 from orchestrator.studies.pictures import Picture
 from orchestrator.studies.verdicts import CANNOT_HOLD, MET, NOT_MET, Row
@@ -15,6 +17,7 @@ def text(book: Book, rows: Sequence[Row], pictures: Sequence[Picture], whole: bo
     """Return the page: verdicts, reasons, figures, and what a referee asks for."""
     parts = [
         _head(book),
+        _findings(book, rows) if whole else "",
         _sets(book),
         _count(rows),
         _verdicts(book, rows),
@@ -40,6 +43,18 @@ def _head(book: Book) -> str:
             "symmetry, or another claim of the paper."
         ),
     ])  # fmt: skip
+
+
+def _findings(book: Book, rows: Sequence[Row]) -> str:
+    """Return what the study says of itself, with the values that were found."""
+    ours = {row.claim.id: row.ours for row in rows}
+
+    def value(place: re.Match[str]) -> str:
+        return number(ours[place[1]].get(place[2] or book.judged_by), DIGITS - 1)
+
+    lines = (filled(f"- {PLACE.sub(value, finding)}", "  ") for finding in book.documents.claims.findings)
+    found = "\n".join(lines)
+    return f"## In short\n{found}" if found else ""
 
 
 def _sets(book: Book) -> str:
@@ -80,7 +95,8 @@ def _by_set(book: Book, rows: Sequence[Row]) -> str:
         (row.claim.id, row.claim.unit, number(row.claim.values), *(number(row.ours.get(n), DIGITS) for n in book.sets))
         for row in measured
     )
-    return "### Ours by set\n" + table(("id", "unit", "paper", *(f"`{name}`" for name in book.sets)), lines)
+    note = "A time to settle that is that of the whole run, 20, 25 or 40 s, says that it has not settled."
+    return f"### Ours by set\n{note}\n\n" + table(("id", "unit", "paper", *(f"`{name}`" for name in book.sets)), lines)
 
 
 def _in_column(book: Book, row: Row, parameter_set: str) -> Sequence[float] | None:

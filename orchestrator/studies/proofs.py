@@ -31,7 +31,8 @@ class Proof:
 
 def symmetry(book: Book, claim: Claim) -> Proof:
     """The signal is exactly 0 in every run: by mirror symmetry nothing turns the robot that way."""
-    values = [v for name in book.sets for v in book.measured(claim, name, "largest") or []]
+    of_angle = claim.model_copy(update={"unit": "deg"})
+    values = [v for name in book.sets for v in book.measured(of_angle, name, "largest") or []]
     worst = max(values, default=math.inf)
     return Proof(worst <= ZERO, f"the largest of all our runs is {worst:.1g}°")
 

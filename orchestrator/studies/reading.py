@@ -11,7 +11,7 @@ from pydantic import BaseModel, ValidationError
 from orchestrator.catalogue.documents import read
 from orchestrator.catalogue.quantities import complaints
 from orchestrator.coupling.errors import InputError, nearest
-from orchestrator.studies.documents import Claims, Documents, Landings
+from orchestrator.studies.documents import PLACE, Claims, Documents, Landings
 from orchestrator.studies.formulas import FORMULAS
 from orchestrator.studies.measures import MEASURES
 from orchestrator.studies.proofs import PROOFS
@@ -28,7 +28,8 @@ def shipped(name: str = "paper") -> Path:
 
 def load_study(folder: Path) -> Documents:
     """Read the two files in `folder`; `InputError` with all that is wrong with them."""
-    landings, claims = (_read(folder / f"{model.__name__.lower()}.toml", model) for model in (Landings, Claims))
+    landings = _read(folder / "landings.toml", Landings)
+    claims = _read(folder / "claims.toml", Claims)
     found = Documents(folder, landings, claims)
     problems = [f"{folder / 'landings.toml'}: {line}" for line in _of_landings(landings)]
     problems += [f"{folder / 'claims.toml'}: {line}" for line in _of_claims(claims, landings)]
@@ -59,6 +60,9 @@ def _of_landings(found: Landings) -> Iterator[str]:
 def _of_claims(found: Claims, landings: Landings) -> Iterator[str]:
     yield from _unknown("judged_by", [found.judged_by], landings.sets, "set")
     ids = [claim.id for claim in found.claim]
+    places = [place for finding in found.findings for place in PLACE.findall(finding)]
+    yield from _unknown("findings", (name for name, _ in places), ids, "claim")
+    yield from _unknown("findings", (name for _, name in places if name), landings.sets, "set")
     for i, claim in enumerate(found.claim, start=1):
         place = f"claim[{i}] ({claim.id})"
         if ids.count(claim.id) > 1 and ids.index(claim.id) < i - 1:

@@ -94,8 +94,8 @@ def _damping(book: Book) -> str:
         "Drag per length is ½ ρ_air C_d d |v_n| v_n. In still air a line that swings with the velocity amplitude v loses "
         f"as much in a cycle as alpha = 8/(3 π) · ½ ρ_air C_d d v / ρA takes: {still_air():.2g} 1/s at {STILL_SPEED:g} m/s. "
         "About a cross wind U the same force is linear, alpha = ½ ρ_air C_d d U / ρA for motion across it and twice that "
-        f"along it: {low:.2g} and {high:.2g} 1/s at {WIND:g} m/s. The paper's 1.0 1/s is beyond both: that all landings are "
-        "safe rests on it."
+        f"along it: {low:.2g} and {high:.2g} 1/s at {WIND:g} m/s. The last row is a run with that drag of still air "
+        "itself, in the place of alpha. The paper's 1.0 1/s is beyond both: that all landings are safe rests on it."
     )
     return _section(book, "Where the damping comes from", "damping", "alpha [1/s]", USUAL, words, "damping")
 
@@ -141,7 +141,7 @@ def _contact(book: Book) -> str:
 def _yaw(book: Book) -> str:
     words = (
         "A symmetric robot on a straight line neither yaws nor pitches. An axle that is misaligned turns the robot by as much, "
-        "as the groove aligns with the line: it swings about that angle with a period of 5 s, and comes to rest there. A "
+        "as the groove aligns with the line: it swings about that angle, and comes to rest there. A "
         "centre of mass to the side makes it lean, and hardly turn; one ahead makes it roll."
     )
     return _section(
@@ -152,9 +152,9 @@ def _yaw(book: Book) -> str:
 def _set_down(book: Book) -> str:
     words = (
         "Let go, the robot's weight is on the line at once, and the force overshoots. Set down by a thrust that falls from its "
-        "weight to zero, it does not: the experiment's peak of 400 N was a robot that was set down."
+        "weight to zero, it hardly does: the experiment's peak of 400 N is that of a robot that was set down."
     )
-    asked = (FORCE_PEAK, Asked("first amplitude of Z [m]", "swing", Z, "m"))
+    asked = (FORCE_PEAK, Asked("Z by that in the end", "overshoot", Z, "1"))
     return _section(book, "Set down or let go", "set_down", "", asked, words, "set_down")
 
 

@@ -11,6 +11,7 @@ from typing import TypeVar
 from orchestrator.coupling.errors import DONE, FAILED
 from orchestrator.coupling.run.results import replacing, write_json
 from orchestrator.runs.batch import Counted, run_batch
+from orchestrator.runs.directory import folder_for
 from orchestrator.runs.job import Done, Job
 from orchestrator.studies import identified
 from orchestrator.studies.book import Book, jobs_of, jobs_of_sensitivity, jobs_of_series
@@ -71,10 +72,10 @@ def reproduce(
     """
     documents = load_study(study or shipped())
     claims = documents.chosen(only)
+    page = folder_for(docs or (out if only else DOCS), "--docs") / "reproduction.md"
     start = clock.monotonic()
     book = _run(documents, claims, out, whole=not only, workers=workers, progress=progress)
     rows = rows_of(book, claims)
-    page = (docs or (out if only else DOCS)) / "reproduction.md"
     _write(book, rows, page, whole=not only)
     return Reproduction(book, rows, page, clock.monotonic() - start)
 

@@ -99,6 +99,12 @@ class Graph(Arrays):
         self.close()
 
     @property
+    def courses(self) -> dict[str, Course]:
+        """The inputs that follow a course over time, ``component.input``, with their courses."""
+        driven = {name: fmu.driven for name, fmu in self.components.items() if fmu.driven is not None}
+        return {f"{name}.{i}": course for name, one in driven.items() for i, course in one.courses.items()}
+
+    @property
     def unfed(self) -> list[str]:
         """Continuous inputs, ``component.variable``, that keep their start value: nothing feeds them, nobody has set them."""
         made = map(".".join, self.free_rates)

@@ -84,11 +84,13 @@ class Log:
 
 
 class Recorder:
-    """Reads the signals of a log from the FMUs, one call an FMU and type.
+    """Reads the signals of a log from the FMUs, one call an FMU and type; of an input that follows a course, from that.
+
+    An FMU holds what it was given for the last step, a mean; its course has a value at the communication point.
 
     Parameters
     ----------
-    record : signals ``component.variable``; None: every output that is a number
+    record : signals ``component.variable``; None: every output that is a number, and every input that follows a course
 
     Attributes
     ----------
@@ -96,15 +98,18 @@ class Recorder:
     """
 
     def __init__(self, graph: Graph, record: Sequence[str] | None):
-        self.signals = _all_outputs(graph) if record is None else list(record)
+        self.signals = [*_all_outputs(graph), *graph.courses] if record is None else list(record)
         owners = [signal.partition(".")[0] for signal in self.signals]
         missing = [s for s, owner in zip(self.signals, owners, strict=True) if owner not in graph.components]
         if missing:
             raise ValueError(f"cannot record {missing[0]}: no such component{nearest(missing[0], graph.components)}")
         self.row = np.zeros(len(self.signals))
         self.groups: list[tuple[Group, np.ndarray | None]] = []
+        self.courses = [(i, graph.courses[s]) for i, s in enumerate(self.signals) if s in graph.courses]
+        followed = {i for i, _ in self.courses}
         for component, fmu in graph.components.items():
-            places = np.array([i for i, owner in enumerate(owners) if owner == component], dtype=np.intp)
+            own = [i for i, owner in enumerate(owners) if owner == component and i not in followed]
+            places = np.array(own, dtype=np.intp)
             if places.size:
                 self.groups.append(self._group(fmu, places))
         split = {signal: signal.partition(".") for signal in self.signals}
@@ -117,12 +122,14 @@ class Recorder:
             return fmu.group(names, self.row[places[0] : places[-1] + 1]), None
         return fmu.group(names), places
 
-    def read(self, row: np.ndarray) -> None:
-        """Read all signals into `row` (len(signals),)."""
+    def read(self, row: np.ndarray, t: float) -> None:
+        """Read all signals at the communication point `t` (s) into `row` (len(signals),)."""
         for group, places in self.groups:
             group.get_finite()
             if places is not None:
                 self.row[places] = group.values
+        for i, course in self.courses:
+            self.row[i] = course.reached(t)
         row[:] = self.row
 
 

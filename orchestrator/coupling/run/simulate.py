@@ -39,7 +39,8 @@ def simulate(
     master : a master made for `graph`, ``IqnIls(graph, tolerance=1e-9)``; or its class or its name in `MASTERS`, with
         default options
     start, stop, macro_step : s; the macro step divides the time between them
-    record : signals to record (numbers of any type), ``component.variable``; None: every output
+    record : signals to record (numbers of any type), ``component.variable``; None: every output, and every input that follows
+        a course over time, by its value at the communication points
     on_step : called after every macro step
     timeout : s of wall time that one call of an FMU may take. The run is then made in a thread of its own;
         an FMU that hangs is left behind in it, and the caller should end the process (`os._exit`) once the
@@ -126,7 +127,7 @@ class _Simulation:
             self.work.start()
             self.graph.observers.append(self.work)
             self.residual[0] = self.work.residual
-        self.recorder.read(self.log.values[0])
+        self.recorder.read(self.log.values[0], start)
         self.rows = 1
 
     def _advance(self) -> None:
@@ -147,7 +148,7 @@ class _Simulation:
     def _note(self, report: StepReport) -> None:
         """Write the macro step that has just been made into the log."""
         log, row = self.log, self.rows
-        self.recorder.read(log.values[row])
+        self.recorder.read(log.values[row], float(log.time[row]))
         log.steps.append(report)
         if self.work.names:
             self.energy[row], self.residual[row] = self.work.total, self.work.residual

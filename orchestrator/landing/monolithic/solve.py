@@ -284,7 +284,13 @@ def integrate(
         if progress is not None:
             progress(float(times[i]))
     wall = clock.perf_counter() - start
-    return Solution(np.asarray(times), recorder.signals(), wall, integrator.steps, tolerance)
+    signals = recorder.signals() | _inputs(integrator.problem, times)
+    return Solution(np.asarray(times), signals, wall, integrator.steps, tolerance)
+
+
+def _inputs(problem: Problem, times: np.ndarray) -> dict[str, np.ndarray]:
+    """Return the inputs that follow a course over time, at the output times."""
+    return {f"robot.{n}": np.array([c.reached(t) for t in times.tolist()]) for n, c in problem.courses.items()}
 
 
 def solve(
