@@ -118,13 +118,16 @@ class Stand:
 
     def __exit__(self, *_: object) -> None: ...
 
-    def run(self, jobs: Sequence[Job], ended: Callable[[Done], None]) -> list[Done]:
+    def run(
+        self, jobs: Sequence[Job], progress: Callable[[int, int], None], ended: Callable[[Done], None]
+    ) -> list[Done]:
         done = [Done(job, None, None if type(self).made(job) is not None else "failed") for job in jobs]
         for one in done:
             safe = type(self).made(one.job)
             verdict = "kept" if safe else "exceeded"
             vars(one)["summary"] = {"safe": safe, "limits": {"roll": {"verdict": verdict, "share": 0.5, "worst": 0.1}}}
             ended(one)
+        progress(len(done), len(jobs))
         return done
 
 

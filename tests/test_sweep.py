@@ -19,11 +19,12 @@ import pytest
 import orchestrator
 from orchestrator.cli.commands import main
 from orchestrator.coupling.errors import InputError
+from orchestrator.runs import batch
 from orchestrator.runs.job import Job, make
 from orchestrator.runs.job import found as find
 from orchestrator.studies.sweep import design, solve, write
 from orchestrator.studies.sweep.distributions import Distribution
-from orchestrator.studies.sweep.study import Study, load_study, study_of
+from orchestrator.studies.sweep.study import Study, load_study, path_of, study_of
 
 OSCILLATOR = """
 scenario = "oscillator"
@@ -254,6 +255,19 @@ def test_a_bad_study_is_refused_with_place_cause_and_cure(
     assert not (tmp_path / "out").exists(), "nothing is touched"
 
 
+def test_a_folder_is_known_before_its_first_run_has_ended(tmp_path: Path, monkeypatch: pytest.MonkeyPatch):
+    study, out = load_study(oscillator(tmp_path)), tmp_path / "out"
+
+    def killed(*_: object) -> None:
+        raise KeyboardInterrupt
+
+    monkeypatch.setattr(batch.Batches, "_made", killed)
+    with pytest.raises(KeyboardInterrupt):
+        run(study, out)
+    assert not json.loads((out / "study.json").read_text(encoding="utf-8"))["complete"] and rows(out) == []
+    assert write.place_of(out, study) == out
+
+
 def test_a_folder_of_something_else_is_left_alone(tmp_path: Path):
     study, out = load_study(oscillator(tmp_path)), tmp_path / "out"
     out.mkdir()
@@ -279,7 +293,7 @@ def test_a_sweep_in_python(tmp_path: Path, monkeypatch: pytest.MonkeyPatch):
     counts: list[tuple[int, int, int]] = []
     document = tomllib.loads(LANDING.replace("0.2", "0.1"))
     found = orchestrator.sweep(document, workers=1, progress=lambda *now: counts.append(now))
-    assert found.directory.parent == Path("runs") and counts == [(1, 2, 0), (2, 2, 0)]
+    assert found.directory.parent == Path("runs") and counts == [(0, 2, 0), (1, 2, 0), (2, 2, 0)]
     assert found.table["landing.position"].tolist() == [20.0, 60.0] and found.table["safe"].tolist() == [1.0, 1.0]
     assert found.table["binding"].dtype == object and found.probability == []
     assert found.safe_ranges == ["landing.position: safe from 20 to 60 m (2 values)"] and "2 safe" in repr(found)
@@ -291,3 +305,20 @@ def test_a_sweep_in_python(tmp_path: Path, monkeypatch: pytest.MonkeyPatch):
         assert found.frame().shape == (2, len(found.table))
     again = orchestrator.sweep(document)
     assert again.directory == found.directory and again.counts == found.counts
+
+
+# -- what is shipped --------------------------------------------------------------------------------------------------
+
+
+def test_a_cut_of_the_papers_points_and_masses(tmp_path: Path):
+    """Heavier is nearer to the limits; 100 kg at midspan goes beyond the clearance, which it nears by its weight alone."""
+    shipped = load_study(path_of("points_masses"))
+    assert shipped.name == "points_masses" and len(design.groups(shipped)) == 40
+    vary = {"landing.position": [100.0], "robot.parameters.mass": [10.0, 55.0, 100.0]}
+    cut = shipped.model_copy(update={"vary": vary, "set": {"simulation.stop_time": 2.0}})
+    found = run(cut, tmp_path / "out")
+    light, middle, heavy = found.outcomes
+    for name in ("z", "tension"):
+        assert light.margins[name] > middle.margins[name] > heavy.margins[name], name
+    assert [outcome.safe for outcome in found.outcomes] == [True, True, False]
+    assert heavy.binding == "z" and not found.failed

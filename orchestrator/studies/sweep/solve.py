@@ -5,6 +5,7 @@ from __future__ import annotations
 import time
 from collections.abc import Callable, Sequence
 from dataclasses import dataclass, field
+from math import inf
 from pathlib import Path
 from typing import Any
 
@@ -119,12 +120,12 @@ class _Look:
         self.found, self.save, self.told = found, save, told
         self.before = list(found.outcomes)
         self.jobs: list[Job] = [job(found.study, row) for row in wanted]
-        self.rows, self.done, self.saved = wanted, dict[str, Done](), 0.0
+        self.rows, self.done, self.saved = wanted, dict[str, Done](), -inf
 
     def made(self, batches: Batches) -> None:
         """Make the runs; what is done is saved even if they are interrupted."""
         try:
-            ended = batches.run(self.jobs, ended=self._ended)
+            ended = batches.run(self.jobs, self._counted, self._ended)
         except InputError as error:
             raise self._in_words(error) from None
         except BaseException:
@@ -136,9 +137,12 @@ class _Look:
 
     def _ended(self, done: Done) -> None:
         self.done[done.job.key] = done
-        failed = len(self.found.failed) if self.before else 0
-        failed += sum(one.failure is not None for one in self.done.values())
-        self.told(len(self.before) + len(self.done), len(self.before) + len(self.jobs), failed)
+
+    def _counted(self, done: int, of: int) -> None:
+        """Tell how far it is, and save it now and then; at first before anything is run, so that the folder is known."""
+        failed = sum(one.failure is not None for one in self.done.values())
+        failed += sum(outcome.done.failure is not None for outcome in self.before)
+        self.told(len(self.before) + done, len(self.before) + of, failed)
         if time.monotonic() > self.saved + SAVED_EVERY:
             self._gather()
             self.save(self.found)
