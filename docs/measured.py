@@ -55,7 +55,12 @@ def one_round() -> dict[str, Any]:
     parts = implicit.runs[0].errors
     mesh = {name: (parts[signal].mesh or 0.0) / scales[signal].scale for name, signal in SIGNALS.items()}
     rows = [row(run) for run in (*implicit.runs, *explicit.runs)]
-    return {"scenario": SCENARIO, "stop": STOP, "reference": {"mesh": mesh, "wall": reference.wall_s / STOP}, "rows": rows}
+    return {
+        "scenario": SCENARIO,
+        "stop": STOP,
+        "reference": {"mesh": mesh, "wall": reference.wall_s / STOP},
+        "rows": rows,
+    }
 
 
 def row(run: Any) -> dict[str, Any]:
