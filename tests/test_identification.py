@@ -181,7 +181,7 @@ def test_wrong_claims_are_said(tmp_path: Path, old: str, new: str, words: str):
 def test_the_studies_of_the_paper_are_whole(name: str):
     study = load_study(path_of(name))
     what = experiment(study)
-    assert len(what.used) >= 5
+    assert sum(datum.value.size for datum in what.used) >= len(study.parameters)  # or anything meets them
     assert study.claims is not None
     assert not set(study.claims.used) & set(study.claims.predicted)
 
