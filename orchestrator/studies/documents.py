@@ -8,7 +8,7 @@ from dataclasses import dataclass
 from pathlib import Path
 from typing import Annotated, Any, Literal
 
-from pydantic import Field, model_validator
+from pydantic import Field, PrivateAttr, model_validator
 
 from orchestrator.coupling.errors import InputError, nearest
 from orchestrator.scenario.types import Section
@@ -19,6 +19,22 @@ PLACE = re.compile(r"\{([\w-]+)(?::(\w+))?\}")
 """Where a finding has ours of a claim, and of which set."""
 Positive = Annotated[float, Field(gt=0.0)]
 NonNegative = Annotated[float, Field(ge=0.0)]
+
+
+class StudyFile(Section):
+    """A study that is one file, and knows which."""
+
+    _path: Path = PrivateAttr(default=Path("study.toml"))
+
+    @property
+    def path(self) -> Path:
+        """The study's file."""
+        return self._path
+
+    @property
+    def name(self) -> str:
+        """The file's name without its ending."""
+        return self._path.stem
 
 
 class ParameterSet(Section):

@@ -20,12 +20,13 @@ from __future__ import annotations
 from pathlib import Path
 from typing import Annotated, Any, Literal, Self
 
-from pydantic import Field, PrivateAttr, ValidationError, model_validator
+from pydantic import Field, ValidationError, model_validator
 
 from orchestrator.catalogue.documents import read
 from orchestrator.catalogue.quantities import complaints
 from orchestrator.coupling.errors import InputError, nearest
 from orchestrator.scenario.types import Count, Positive, Section
+from orchestrator.studies.documents import StudyFile
 from orchestrator.studies.fit import Parameter
 from orchestrator.studies.reading import shipped
 
@@ -136,7 +137,7 @@ class Search(Section):
     intervals: bool = True
 
 
-class Study(Section):
+class Study(StudyFile):
     """An identification, as it is read."""
 
     title: str
@@ -147,17 +148,6 @@ class Study(Section):
     parameters: Annotated[dict[str, Sought], Field(min_length=1)]
     claims: Claims | None = None
     measurement: list[Measurement] = Field(default_factory=list)
-    _path: Path = PrivateAttr(default=Path("study.toml"))
-
-    @property
-    def path(self) -> Path:
-        """The study's file."""
-        return self._path
-
-    @property
-    def name(self) -> str:
-        """The file's name without its ending."""
-        return self._path.stem
 
     @property
     def sought(self) -> list[Parameter]:

@@ -23,7 +23,7 @@ from pathlib import Path
 from typing import Annotated, Any, Literal, Self
 
 import numpy as np
-from pydantic import Field, PrivateAttr, ValidationError, model_validator
+from pydantic import Field, ValidationError, model_validator
 
 from orchestrator.catalogue.documents import is_whole, read
 from orchestrator.catalogue.quantities import complaints
@@ -31,6 +31,7 @@ from orchestrator.coupling.errors import InputError, nearest
 from orchestrator.coupling.run.results import plain
 from orchestrator.landing.safety import UNITS
 from orchestrator.scenario.types import Count, Positive, Section
+from orchestrator.studies.documents import StudyFile
 from orchestrator.studies.reading import shipped
 from orchestrator.studies.sweep.distributions import WORDS, Distribution
 
@@ -126,7 +127,7 @@ class Sample(Section):
         return self
 
 
-class Study(Section):
+class Study(StudyFile):
     """A sweep, as it is read.
 
     Attributes
@@ -152,17 +153,6 @@ class Study(Section):
     extremes: list[str] | None = None
     record: Literal["none", "all"] | list[Count] = "none"
     timeout: Positive | None = None
-    _path: Path = PrivateAttr(default=Path("study.toml"))
-
-    @property
-    def path(self) -> Path:
-        """The study's file."""
-        return self._path
-
-    @property
-    def name(self) -> str:
-        """The file's name without its ending."""
-        return self._path.stem
 
     @property
     def values(self) -> dict[str, list[Any]]:
