@@ -53,7 +53,8 @@ export function buildRobot(spec, palette) {
   for (const wheel of size.wheels) addFork(parts, wheel, size);
   parts.into(group, palette);
   group.add(...wheels.map(w => w.group), ...blades);
-  return { group, wheels: wheels.map(w => w.turning), blades, reach: Math.max(size.across, size.along) };
+  const reach = Math.max(size.across, size.along), [low, high] = heightsOf(size);
+  return { group, wheels: wheels.map(w => w.turning), blades, reach, low, high };
 }
 
 // The specification with usual values for what it does not say.
@@ -63,6 +64,12 @@ function complete(spec) {
   const radius = Math.max(0.02, ...wheels.map(w => w.radius));
   const top = wheels.length ? Math.max(...z) + radius : 0.2, line = wheels.length ? Math.min(...z) - 0.7 * radius : -0.2;
   return { height: 0.6, rotor_plane: 0, below_line: null, ...spec, across, along, wheels, radius, top, line };
+}
+
+// Lowest and highest point of what is drawn, from b.
+function heightsOf({ layout, height, below_line: below, line, top, rotor_plane: z }) {
+  if (layout === 'bottom') return [line - (below ?? 0.25), z + 0.03];
+  return [Math.min(top - height, z - 0.3), Math.max(top, z + 0.03)];
 }
 
 function addRotors(parts, size, palette) {

@@ -133,7 +133,7 @@ export class View {
   // The reference: a pale robot and line, its difference from the run exaggerated until it can be seen.
   #reference(model) {
     if (!model.hasReference) { this.#replace('ghostRobot', null); this.#replace('ghostLine', null); this.options.reference = 0; return; }
-    this.pale ??= new MeshPhongMaterial({ transparent: true, opacity: 0.4, depthWrite: false });
+    this.pale ??= new MeshPhongMaterial({ transparent: true, opacity: 0.35, depthWrite: false, polygonOffset: true, polygonOffsetFactor: 1, polygonOffsetUnits: 4 });
     const pale = new Proxy({}, { get: () => this.pale });
     if (!this.ghostRobot && model.head.robot) this.#replace('ghostRobot', buildRobot(model.head.robot, pale));
     const nodes = model.line(model.start, `reference/${model.linePrefix}`), radius = (model.head.cable_diameter ?? 0.02) / 2;
@@ -200,14 +200,26 @@ export class View {
     const { head } = this.model, at = this.rest ? hermite(this.rest, contactArc(this.model, this.model.start)) : [0, 0, 0];
     const pose = this.model.pose(this.model.start);
     this.home = this.rest ? at : pose?.position ?? at;
+    const { low = -0.5, high = 0.5, reach = 1.25 } = this.robot ?? {}, [least, most] = this.#heights();
     return {
-      at: this.home, reach: this.robot?.reach ?? 1.25, hangs: head.robot?.layout !== 'bottom', span: this.span, sag: this.sag,
-      aspect: this.camera.aspect,
+      at: this.home, low: least + low, high: Math.max(most + high, this.home[2]), reach, hangs: head.robot?.layout !== 'bottom',
+      span: this.span, sag: this.sag, aspect: this.camera.aspect,
     };
   }
 
+  // Least and largest height of the robot over the landing.
+  #heights() {
+    const found = Array.from(this.model.get('robot.body.position.z') ?? []).filter(Number.isFinite);
+    if (!found.length) return [this.home[2], this.home[2]];
+    return [found.reduce((a, b) => Math.min(a, b)), found.reduce((a, b) => Math.max(a, b))];
+  }
+
   set(options) {
+    const before = this.place(this.home);
     Object.assign(this.options, options);
+    this.#shift(this.place(this.home).map((x, c) => x - before[c]));   // the robot stays in the picture
+    if (!this.follow) this.followed = this.place(this.home);
+    else this.followed = this.followed.map((x, c) => x + this.place(this.home)[c] - before[c]);
     this.#stale = true;
     this.invalidate();
   }
@@ -239,9 +251,14 @@ export class View {
 
   #followTo(point) {
     if (!this.follow || !point) return;
-    const step = new Vector3(...point).sub(new Vector3(...this.followed));
-    this.controls.target.add(step); this.camera.position.add(step);
-    this.followed = point;
+    const now = this.place(point);
+    this.#shift(now.map((x, c) => x - this.followed[c]));
+    this.followed = now;
+  }
+
+  #shift(step) {
+    this.controls.target.add(new Vector3(...step));
+    this.camera.position.add(new Vector3(...step));
   }
 
   // What does not move with time, at the present scales: line at rest, path, ground.
