@@ -318,6 +318,6 @@ def _directory(out: Out, name: str) -> Iterator[RunDirectory | None]:
 def _draw(pictures: bool) -> Draw:
     if not pictures:
         return no_pictures
-    from orchestrator.report.page import draw
+    from orchestrator.report.drawing import draw
 
     return draw
