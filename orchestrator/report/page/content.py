@@ -2,7 +2,7 @@
 
 from __future__ import annotations
 
-from collections.abc import Iterator, Mapping, Sequence
+from collections.abc import Iterable, Iterator, Mapping, Sequence
 from dataclasses import dataclass, replace
 from typing import Any
 
@@ -47,7 +47,7 @@ def _of_runs(first: Run, others: Sequence[Run], manifest: Manifest, most: int) -
     head = _head(_kind(first), first, manifest, data, plots)
     shown = [_shown(first, ""), *(_shown(run, f"{run.label}/") for run in others)] if others else []
     lower = [_runs_card([first, *others]) if others else Html(), *_lower(first, manifest), *_of_each(others)]
-    return Content(replace(head, runs=shown), data, Body(_top(first, manifest, data), Html("".join(lower))))
+    return Content(replace(head, runs=shown), data, Body(_top(first, manifest, data), _more(lower)))
 
 
 def _of_comparison(found: Comparison, manifest: Manifest, most: int) -> Content:
@@ -63,7 +63,7 @@ def _of_comparison(found: Comparison, manifest: Manifest, most: int) -> Content:
     )
     lower = [_comparison_card(found), _runs_card(found.results)]
     lower += [*_lower(first, manifest), tables.limits(reference.safety, "reference"), *_of_each(others)]
-    return Content(head, data, Body(_comparison_top(found, first, manifest, data), Html("".join(lower))))
+    return Content(head, data, Body(_comparison_top(found, first, manifest, data), _more(lower)))
 
 
 # -- head ---------------------------------------------------------------------------------------------------------
@@ -124,6 +124,11 @@ def _line(run: Run) -> LinePlace | None:
     return LinePlace("", exact, "" if exact else THROUGH_POINTS.format(n=run.fields["position"].shape[1]))
 
 
+def _more(cards: Iterable[Html]) -> Html:
+    """Return the cards below the picture."""
+    return tag("section", cards, class_="more", aria_label="Numbers")
+
+
 # -- body ---------------------------------------------------------------------------------------------------------
 
 
@@ -165,7 +170,7 @@ def _notices(run: Run, manifest: Manifest, data: Packed) -> Iterator[Html]:
     line = _line(run)
     for note in (data.note, line.note if line is not None else ""):
         if note:
-            yield tag("p", note, class_="notice quiet")
+            yield tag("p", note, class_="muted")
 
 
 def _lower(run: Run, manifest: Manifest) -> Iterator[Html]:
@@ -175,8 +180,8 @@ def _lower(run: Run, manifest: Manifest) -> Iterator[Html]:
     yield tables.errors(run)
     yield tables.numerics(summary)
     yield tables.said_of(run, summary)
-    yield tables.parameters(manifest, summary)
     yield tables.provenance(manifest)
+    yield tables.parameters(manifest, summary)
 
 
 def _of_each(runs: Sequence[Run]) -> Iterator[Html]:
@@ -207,8 +212,8 @@ def _comparison_card(found: Comparison) -> Html:
         )
         for check in found.checks
     ]
-    said = tag("p", f"Shares of each signal's range, against the reference: {found.reference.kind}.", class_="hint")
-    return card("comparison", "Errors against the reference", (said, table(head, rows)))
+    said = tag("p", f"Shares of each signal's range, against the reference: {found.reference.kind}.", class_="muted")
+    return card("comparison", "Errors against the reference", (said, table(head, rows)), wide=True)
 
 
 def _runs_card(runs: Sequence[Run]) -> Html:
@@ -224,4 +229,4 @@ def _runs_card(runs: Sequence[Run]) -> Html:
         )
         for r in runs
     ]
-    return card("runs", "Runs", table(head, rows))
+    return card("runs", "Runs", table(head, rows), wide=True)

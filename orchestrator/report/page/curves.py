@@ -6,6 +6,8 @@ import re
 from collections.abc import Iterable, Iterator, Mapping
 from typing import Any
 
+import numpy as np
+
 from orchestrator.coupling.run.results import Table
 from orchestrator.landing.safety import TENSIONS
 from orchestrator.report.page.head import Hud, Plot, PlotLimit, PlotSignal
@@ -15,7 +17,9 @@ COLOURS = 8
 DASHES: tuple[list[int], ...] = ([], [7, 4], [2, 3])
 INPUTS = ("Thrust", "Torque", "Drive torque")
 """Panels of a landing's inputs over time, where they vary."""
-HEIGHT, ANGLES = "robot.body.position.z", ("robot.roll", "robot.pitch", "robot.yaw")
+HEIGHT = "robot.body.position.z"
+UNSEEN = 1e-5
+"""rad; smaller angles are not plotted."""
 Limits = Mapping[str, Mapping[str, Any]]
 
 
@@ -46,8 +50,10 @@ def _of_panel(panel: Panel, digits: int) -> Plot:
 def _of_landing(table: Table, limits: Limits) -> Iterator[Plot]:
     height = _lines(table, {HEIGHT: "height"})
     yield Plot("Height of the robot", "m", 1.0, 3, True, height, _height_limits(table, limits))
-    angles = _lines(table, {name: name.rpartition(".")[2] for name in ANGLES})
-    yield Plot("Angles", "°", DEGREES, 2, False, angles, list(_angle_limits(limits)))
+    yield Plot(
+        "Roll", "°", DEGREES, 2, False, _lines(table, {"robot.roll": "roll"}), list(_angle_limits(limits, "roll"))
+    )
+    yield from _other_angles(table, limits)
     forces = _lines(table, _forces(table), first=1)
     yield Plot("Contact force", "N", 1.0, 0, False, forces)
     tensions = _lines(table, {name: name.rpartition("_")[2] for name in TENSIONS})
@@ -76,14 +82,21 @@ def _height_limits(table: Table, limits: Limits) -> list[PlotLimit]:
     if "z" not in limits or HEIGHT not in table or limits["z"]["reference"] is None:
         return []
     lowest = limits["z"]["reference"] - limits["z"]["limit"] - float(table[HEIGHT][0])
-    return [PlotLimit(lowest, "lowest allowed")]
+    return [PlotLimit(lowest, f"lowest allowed, {lowest:.2f} m")]
 
 
-def _angle_limits(limits: Limits) -> Iterator[PlotLimit]:
-    for name in ("roll", "yaw", "pitch"):
-        if name in limits:
-            most = DEGREES * limits[name]["limit"]
-            yield from (PlotLimit(sign * most, f"limit of {name}, {most:.1f}°") for sign in (1.0, -1.0))
+def _other_angles(table: Table, limits: Limits) -> Iterator[Plot]:
+    """Yield pitch and yaw where they can be seen: they are zero by symmetry in most landings."""
+    seen = [name for name in ("pitch", "yaw") if np.max(np.abs(table.get(f"robot.{name}", np.zeros(1)))) > UNSEEN]
+    if seen:
+        lines = [PlotLimit(one.at, f"{name}: {one.name}") for name in seen for one in _angle_limits(limits, name)]
+        yield Plot("Pitch and yaw", "°", DEGREES, 2, False, _lines(table, {f"robot.{n}": n for n in seen}), lines)
+
+
+def _angle_limits(limits: Limits, name: str) -> Iterator[PlotLimit]:
+    if name in limits:
+        most = DEGREES * limits[name]["limit"]
+        yield from (PlotLimit(sign * most, f"limit, {sign * most:.1f}°") for sign in (1.0, -1.0))
 
 
 def _tension_limits(limits: Limits) -> list[PlotLimit]:

@@ -29,19 +29,19 @@ def table(head: Sequence[Cell], rows: Iterable[Sequence[Cell]]) -> Html:
     """Return a table with a row of headings; what is wider than the page scrolls."""
     top = tag("thead", tag("tr", (tag("th", cell, scope="col") for cell in head)))
     body = tag("tbody", (tag("tr", (tag("td", cell) for cell in row)) for row in rows))
-    return tag("div", tag("table", (top, body)), class_="wide")
+    return tag("div", tag("table", (top, body)), class_="scroll")
 
 
 def pairs(rows: Iterable[Sequence[Cell]]) -> Html:
     """Return a table of names and values, without headings."""
     lines = (tag("tr", (tag("th", name, scope="row"), tag("td", value))) for name, value in rows)
-    return tag("div", tag("table", tag("tbody", lines)), class_="wide")
+    return tag("div", tag("table", tag("tbody", lines)), class_="scroll")
 
 
-def card(name: str, title: str, content: Cell | Iterable[Cell]) -> Html:
-    """Return a section of the page with its heading."""
+def card(name: str, title: str, content: Cell | Iterable[Cell], wide: bool = False) -> Html:
+    """Return a section of the page with its heading; a `wide` one is as wide as the page."""
     inner = [content] if isinstance(content, str) else list(content)
-    return tag("section", [tag("h2", title), *inner], class_="card", id=name)
+    return tag("section", [tag("h2", title), *inner], class_="card wide" if wide else "card", id=name)
 
 
 def folded(title: str, content: Cell) -> Html:

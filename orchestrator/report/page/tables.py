@@ -10,10 +10,10 @@ from typing import Any
 import numpy as np
 
 from orchestrator.coupling.run.results import Table
-from orchestrator.landing.safety import HEAD, rows, why_not_judged
+from orchestrator.landing.safety import VERDICTS, why_not_judged
 from orchestrator.report.page.html import Cell, Html, card, folded, pairs, seek, table, tag
 from orchestrator.report.page.tiles import measured
-from orchestrator.report.signals import in_the_air
+from orchestrator.report.signals import LABELS, in_the_air
 from orchestrator.runs.errors import NAMES, Parts, range_of
 from orchestrator.runs.result import Run
 
@@ -41,12 +41,17 @@ def limits(said: Mapping[str, Any], whose: str = "") -> Html:
     """
     if not said.get("limits"):
         return Html()
-    sources = (_from(judged) for judged in said["limits"].values())
-    times = ((name, judged["time"]) for name, judged in said["limits"].items())
-    buttons = (seek(time, name) for name, time in times)
-    lines = [(*row, source, button) for row, source, button in zip(rows(said), sources, buttons, strict=True)]
+    lines = [_limit_row(name, judged) for name, judged in said["limits"].items()]
+    head = ("limit", "worst", "allowed", "margin", "at", "verdict", "from", "")
     title = "Limits and safety" + (f", {whose}" if whose else "")
-    return card(f"limits{whose and '-'}{whose}", title, (tag("p", said["safety"]), table((*HEAD, "from", ""), lines)))
+    return card(f"limits{whose and '-'}{whose}", title, (tag("p", said["safety"]), table(head, lines)), wide=True)
+
+
+def _limit_row(name: str, judged: Mapping[str, Any]) -> tuple[Cell, ...]:
+    what = LABELS[name].replace("\n", " ")
+    shown = (measured(judged[key], judged["unit"], 4) for key in ("worst", "limit", "margin"))
+    at = f"{judged['time']:.2f} s" + (f", wheel {judged['wheel']}" if judged["wheel"] is not None else "")
+    return what, *shown, at, VERDICTS[judged["verdict"]], _from(judged), seek(judged["time"], what)
 
 
 def _from(judged: Mapping[str, Any]) -> Html:
@@ -106,7 +111,7 @@ def errors(run: Run, reference: Mapping[str, Parts] | None = None) -> Html:
         return Html()
     lines = [_error_row(name, one, range_of(run.table[name]), run) for name, one in parts.items() if name in run.table]
     head = ("signal", *NAMES.values(), "sum", "allowed", "verdict")
-    said = tag("p", "As shares of the signal's range, largest over the run.", class_="hint")
+    said = tag("p", "As shares of the signal's range, largest over the run.", class_="muted")
     why = tag("p", f"not known: {run.estimate_failure}") if run.estimate_failure else Html()
     return card("errors", "Errors by part", (said, table(head, lines), why))
 
@@ -158,14 +163,19 @@ def _numeric(key: str, value: Any) -> str:
 def parameters(manifest: Mapping[str, Any], summary: Mapping[str, Any]) -> Html:
     """Return every value with its source; what is assumed stands out, with the reason."""
     provenance, given = manifest.get("provenance", {}), dict(_leaves("", _sections(manifest["resolved"])))
-    lines = [(name, *_row(value, provenance.get(name, {}))) for name, value in given.items()]
+    lines = [(_short(name), *_row(value, provenance.get(name, {}))) for name, value in given.items()]
     robot = ((summary.get("geometry") or {}).get("robot") or {}).get("quantities", {})
     lines += [(f"robot.{name}", *_row(one["value"], one)) for name, one in robot.items()]
     if not lines:
         return Html()
     assumed = sum('class="assumed"' in row[2] for row in lines)
-    said = tag("p", f"{assumed} of {len(lines)} values are assumed; each says why.", class_="hint")
-    return card("parameters", "Parameters", (said, table(("parameter", "value", "source"), lines)))
+    said = tag("p", f"{assumed} of {len(lines)} values are assumed; each says why.", class_="muted")
+    return card("parameters", "Parameters", (said, table(("parameter", "value", "source"), lines)), wide=True)
+
+
+def _short(name: str) -> str:
+    """Return the path of a value as people read it: ``cable.span``."""
+    return name.replace(".parameters.", ".")
 
 
 def _sections(resolved: Mapping[str, Any]) -> dict[str, Any]:
@@ -214,4 +224,4 @@ def provenance(manifest: Mapping[str, Any]) -> Html:
     rest = {key: value for key, value in manifest.items() if key not in ("resolved", "provenance")}
     listing = tag("pre", json.dumps(rest, indent=1, ensure_ascii=False))
     written = f"line-landing {manifest.get('versions', {}).get('line-landing')}, written {manifest.get('written')}"
-    return card("provenance", "Provenance", (tag("p", written, class_="hint"), folded("manifest", listing)))
+    return card("provenance", "Provenance", (tag("p", written, class_="muted"), folded("manifest", listing)))

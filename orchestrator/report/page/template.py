@@ -19,13 +19,13 @@ NEEDED = ("page.html", "page.css", "page.js")
 PLACEHOLDER = re.compile(r"@@([A-Z]+)@@")
 HOW = "The interactive page was not built; `make page` builds it, then `orchestrator report` makes this one anew."
 PLAIN_STYLE = """body{font:15px/1.5 system-ui,sans-serif;max-width:64em;margin:2em auto;padding:0 1em;color:#1b2430}
-h1{font-size:1.4em;margin:.2em 0}h2{font-size:1.1em;margin:1.6em 0 .2em}.subtitle,.said,.hint,small{color:#5d6875}
+h1{font-size:1.4em;margin:.2em 0}h2{font-size:1.1em;margin:1.6em 0 .2em}.subtitle,.covers,.muted,small{color:#5d6875}
 .verdict{display:inline-block;font-weight:700;padding:.2em .8em;border-radius:1em;background:#e3e7ec}
 .safe{background:#dff3e8;color:#0b7a4b}.unsafe{background:#fbe4e2;color:#b3261e}.unclear{background:#fff1d6;color:#7a4b00}
 .tiles{display:grid;grid-template-columns:repeat(auto-fit,minmax(190px,1fr));gap:10px;margin:1em 0}
 .tile{border:1px solid #ddd;border-radius:8px;padding:.5em .8em}.tile b{display:block;font-size:1.3em}
 .bar{height:6px;background:#e3e7ec;border-radius:3px;margin-top:.4em}.bar i{display:block;height:100%;background:#0072b2}
-.exceeded .bar i{background:#b3261e}table{border-collapse:collapse;margin:.5em 0}.wide{overflow-x:auto}
+.over .bar i{background:#b3261e}table{border-collapse:collapse;margin:.5em 0}.scroll{overflow-x:auto}
 th,td{text-align:left;vertical-align:top;padding:.2em 1.2em .2em 0;border-bottom:1px solid #ddd}
 .assumed{color:#b04a00;font-weight:600}.notice{background:#fff1d6;padding:.5em .8em;border-radius:8px}
 pre{white-space:pre-wrap;font-size:12px}img{max-width:100%;margin:1em 0}button[data-seek]{display:none}"""

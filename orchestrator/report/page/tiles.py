@@ -15,6 +15,8 @@ from orchestrator.report.page.html import Html, tag
 from orchestrator.report.page.scene import Geometry, clearance
 from orchestrator.report.signals import LABELS
 
+KILO = 1e4
+"""N or J, from which on thousands are counted."""
 SIGNS = {"deg": "°", "1": ""}
 
 
@@ -34,7 +36,7 @@ def header(title: str, verdict: Verdict, subtitle: str, said: str = "") -> Html:
     sign = {"safe": "✓ ", "unsafe": "✗ ", "unclear": "? ", "none": ""}[verdict.class_]
     badge = tag("div", sign + verdict.word, class_=f"verdict {verdict.class_}", id="verdict", role="status")
     lines = [tag("h1", title), tag("p", subtitle, class_="subtitle")]
-    lines += [tag("p", said, class_="said", id="said")] if said else []
+    lines += [tag("p", said, class_="covers", id="covers")] if said else []
     return tag("header", (badge, tag("div", lines)))
 
 
@@ -45,14 +47,14 @@ def tiles(said: Mapping[str, Any], table: Table, geometry: Geometry | None) -> H
     return tag("section", found, class_="tiles", aria_label="Margins") if found else Html()
 
 
-def tile(key: str, name: str, value: str, note: str, used: float | None, state: str = "kept") -> Html:
-    """Return a tile; `used`, the share of a limit, is drawn as a bar."""
+def tile(name: str, value: str, note: str, used: float | None, over: bool = False, **data: str) -> Html:
+    """Return a tile; `used`, the share of a limit, is drawn as a bar; scripts find it by its `data`."""
     parts = [tag("span", name), tag("b", value), tag("small", note)]
     if used is not None:
         width = f"width:{100.0 * min(max(used, 0.0), 1.0):.1f}%"
         words = f"{100.0 * used:.0f} % of the limit used" if np.isfinite(used) else "beyond any limit"
         parts.append(tag("div", tag("i", style=width), class_="bar", role="img", aria_label=words))
-    return tag("div", parts, class_=f"tile {state}", data_tile=key)
+    return tag("div", parts, class_="tile over" if over else "tile", **data)
 
 
 def measured(value: float | None, unit: str, digits: int = 3) -> str:
@@ -62,6 +64,8 @@ def measured(value: float | None, unit: str, digits: int = 3) -> str:
     number, unit = readable(value, unit)
     if unit == "1":
         return f"{100.0 * number:.{digits}g} %"
+    if unit in ("N", "J") and abs(number) >= KILO:
+        number, unit = number / 1e3, f"k{unit}"
     sign = SIGNS.get(unit, f" {unit}")
     return f"{number + 0.0:.{digits}g}{sign}"
 
@@ -74,7 +78,8 @@ def _limit_tile(name: str, judged: Mapping[str, Any]) -> Html:
     note = f"limit {measured(judged['limit'], unit)}: {beyond} {measured(margin, unit)}{at}"
     used = float("inf") if share is None else share
     worst = None if judged["worst"] is None else abs(judged["worst"])
-    return tile(name, LABELS[name].replace("\n", " "), measured(worst, unit), note, used, judged["verdict"])
+    over = judged["verdict"] == "exceeded"
+    return tile(LABELS[name].replace("\n", " "), measured(worst, unit), note, used, over, data_limit=name)
 
 
 def _force_tile(table: Table, geometry: Geometry | None) -> Iterator[Html]:
@@ -87,7 +92,7 @@ def _force_tile(table: Table, geometry: Geometry | None) -> Iterator[Html]:
     wheel = f", wheel {name[7:-13]}" if len(tops) > 1 else ""
     weight = _weight(geometry)
     note = f"at {table['time'][row]:.2f} s{wheel}" + (f"; {tops[name][row] / weight:.1f} × weight" if weight else "")
-    yield tile("force", "Largest contact force", measured(float(tops[name][row]), "N"), note, None)
+    yield tile("Largest contact force", measured(float(tops[name][row]), "N"), note, None, data_tile="force")
 
 
 def _weight(geometry: Geometry | None) -> float | None:
@@ -100,4 +105,5 @@ def _gap_tile(table: Table, geometry: Geometry | None) -> Iterator[Html]:
         return
     row, level = int(np.argmin(gap)), abs(geometry["robot"]["line_above_rotors"])
     note = f"of {1e3 * level:.0f} mm when level; at {table['time'][row]:.2f} s"
-    yield tile("clearance", "Least rotor–line gap", f"{1e3 * gap[row]:.0f} mm", note, 1.0 - float(gap[row]) / level)
+    used = 1.0 - float(gap[row]) / level
+    yield tile("Least rotor–line gap", f"{1e3 * gap[row]:.0f} mm", note, used, data_tile="clearance")
