@@ -1,6 +1,6 @@
-"""Who writes a run directory, and who reads it: tables, fields, summary, pictures, the manifest, and last the page.
+"""Who writes a run directory, and who reads it: tables, fields, summary, pictures, page, and last the manifest.
 
-Pictures and page are made by whoever calls, from the directory alone: one that fails is noted and loses no run.
+Pictures and page are made by whoever calls, from what stands there: one that fails is noted and loses no run.
 """
 
 from __future__ import annotations
@@ -13,9 +13,9 @@ from typing import Any
 import numpy as np
 
 from orchestrator.coupling.errors import InputError
-from orchestrator.coupling.run.results import Table, read_fields, read_json, read_table
+from orchestrator.coupling.run.results import Table, plain, read_fields, read_json, read_table
 from orchestrator.runs.compare import Comparison
-from orchestrator.runs.directory import RunDirectory
+from orchestrator.runs.directory import RunDirectory, manifest
 from orchestrator.runs.result import Run
 
 FIELD_UNITS = {
@@ -24,25 +24,18 @@ FIELD_UNITS = {
 }  # fmt: skip
 COUNTS = {"iterations": int, "subdivisions": int, "rejected": int, "columns": int, "converged": bool}
 """Columns of ``iterations.csv`` that are no real numbers."""
-Make = Callable[[Path], object]
-"""Makes something of what stands in a directory, and puts it there."""
-
-
-def nothing(_: Path) -> None:
-    """Make nothing."""
+Manifest = dict[str, Any]
 
 
 @dataclass(frozen=True)
 class Views:
-    """What people look at: the pictures, drawn before the manifest is written, and the page, which shows the manifest too."""
+    """What people look at, made in a directory: the pictures, and the page, which shows what the manifest will say."""
 
-    pictures: Make = nothing
-    page: Make = nothing
+    pictures: Callable[[Path], object] = lambda directory: None
+    page: Callable[[Path, Manifest], object] = lambda directory, manifest: None
 
 
 NO_VIEWS = Views()
-Notes = dict[str, str | None]
-"""Why there are no pictures, or no page; None where there are."""
 
 
 # -- writing --------------------------------------------------------------------------------------------------
@@ -51,10 +44,8 @@ Notes = dict[str, str | None]
 def write_run(directory: RunDirectory, run: Run, views: Views = NO_VIEWS) -> Run:
     """Write all files of a run and return it as it stands there; one that ended early is marked as incomplete."""
     _write_tables(directory, run)
-    notes = {"pictures": _made(directory, views.pictures), "page": None}
-    written = _finish(directory, run, notes)
-    missing = _made(directory, views.page)
-    return written if missing is None else _finish(directory, run, notes | {"page": missing})
+    notes = _viewed(directory, run, run.error, views)
+    return _finish(directory, run, notes)
 
 
 def write_comparison(directory: RunDirectory, comparison: Comparison, views: Views = NO_VIEWS) -> Comparison:
@@ -80,15 +71,7 @@ def _write_runs(directory: RunDirectory, runs: Sequence[Run], views: Views, erro
     folders = [RunDirectory(directory.path / run.label) for run in runs]
     for folder, run in zip(folders, runs, strict=True):
         _write_tables(folder, run)
-    notes = {"pictures": _made(directory, views.pictures), "page": None}
-    written = _finish_all(directory, folders, runs, notes, error)
-    missing = _made(directory, views.page)
-    return written if missing is None else _finish_all(directory, folders, runs, notes | {"page": missing}, error)
-
-
-def _finish_all(
-    directory: RunDirectory, folders: Sequence[RunDirectory], runs: Sequence[Run], notes: Notes, error: str | None
-) -> list[Run]:
+    notes = _viewed(directory, runs[0], error, views)
     written = [_finish(folder, run, notes) for folder, run in zip(folders, runs, strict=True)]
     directory.write_manifest(_dependencies(runs[0]) | notes, error)
     return written
@@ -102,16 +85,23 @@ def _write_tables(directory: RunDirectory, run: Run) -> None:
     directory.write_json("summary.json", run.summary)
 
 
-def _made(directory: RunDirectory, make: Make) -> str | None:
-    """Let pictures or a page be made; return why there are none, if they cannot be."""
+def _viewed(directory: RunDirectory, run: Run, error: str | None, views: Views) -> dict[str, str | None]:
+    """Let pictures and page be made; return why there are none of either, None where there are."""
+    drawn = _failure(lambda: views.pictures(directory.path))
+    said = plain(manifest(_dependencies(run) | {"pictures": drawn}, error))
+    return {"pictures": drawn, "page": _failure(lambda: views.page(directory.path, said))}
+
+
+def _failure(make: Callable[[], object]) -> str | None:
+    """Return why something could not be made; None if it was."""
     try:
-        make(directory.path)
+        make()
     except Exception as error:  # whatever it is: the numbers are there, and worth more
         return f"{type(error).__name__}: {error}"
     return None
 
 
-def _finish(directory: RunDirectory, run: Run, notes: Notes) -> Run:
+def _finish(directory: RunDirectory, run: Run, notes: dict[str, str | None]) -> Run:
     directory.write_manifest(_dependencies(run) | notes, run.error)
     return replace(run, directory=directory.path, manifest=read_json(directory.path / "manifest.json"))
 

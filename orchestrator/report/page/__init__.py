@@ -2,8 +2,9 @@
 
 from __future__ import annotations
 
-from collections.abc import Iterator
+from collections.abc import Iterator, Mapping
 from pathlib import Path
+from typing import Any
 
 from orchestrator.coupling.errors import InputError, OrchestratorError
 from orchestrator.coupling.run.results import read_json, replacing
@@ -34,16 +35,16 @@ def report(directory: Path, web: Path = DIST) -> Path:
     require_finished(directory)
     try:
         list(pictures(directory, results_in(directory)))
-        return write(directory, web)
+        return write(directory, read_json(directory / "manifest.json"), web)
     except Exception as error:  # whatever is in a damaged folder: a file of another kind, half a table, a missing key
         if isinstance(error, OrchestratorError) or (isinstance(error, OSError) and error.errno):
             raise  # said already; or the system's word, a full disk for instance
         raise InputError(f"{directory}: damaged results ({type(error).__name__}: {error}); run it again") from error
 
 
-def write(directory: Path, web: Path = DIST) -> Path:
-    """Write the page of a directory with its manifest, from what stands there, and return its path."""
-    content = of_results(results_in(directory), read_json(directory / "manifest.json"), MOST - OWN)
+def write(directory: Path, manifest: Mapping[str, Any], web: Path = DIST) -> Path:
+    """Write the page of a directory from what stands there and its `manifest`, and return its path."""
+    content = of_results(results_in(directory), manifest, MOST - OWN)
     text = _interactive(content, web) if is_built(web) else _plain(content, directory)
     with replacing(directory / NAME) as temporary:
         temporary.write_text(text, encoding="utf-8")
