@@ -20,7 +20,7 @@ export function camera(name, { at: [x, y, z], low, high, reach, hangs, span, sag
   if (name === 'span' && span) return wholeSpan(span, sag, reach, aspect);
   const tangent = Math.tan(FIELD * Math.PI / 360), middle = (low + high) / 2;
   const distance = Math.max((high - low) / 2 / tangent, 0.62 * reach / (tangent * aspect)) + 0.35 * reach;
-  const ways = name === 'side' ? [1, 0, 0] : [0.83, -0.53, hangs ? 0.16 : 0.3];
+  const ways = name === 'side' ? [1, 0, 0] : [0.8, -0.5, hangs ? 0.33 : 0.3];
   return { ...close, target: [x, y, middle], eye: [x, y, middle].map((v, c) => v + distance * ways[c]) };
 }
 

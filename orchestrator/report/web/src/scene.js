@@ -8,13 +8,14 @@ import { Arrows } from './arrows.js';
 import { Cable, strandMaterial } from './cable.js';
 import { camera, FIELD } from './cameras.js';
 import { css } from './dom.js';
-import { contactArc, spin } from './geometry.js';
+import { contactArc, spin, touch } from './geometry.js';
 import { chord, hermite, locate } from './model.js';
 import { difference, exaggerated } from './reference.js';
 import { buildRobot, materials } from './robot.js';
 import { Ground, groundBelow, supportPalette, Supports } from './supports.js';
 
-const MOST_ARROWS = 32, BLADE_SPEED = 31;   // rad/s: to be seen, not to be true
+const MOST_ARROWS = 32, LEAST_FORCE = 0.01,   // N: less is noise
+   BLADE_SPEED = 31;   // rad/s: to be seen, not to be true
 
 const line = (material, points) => {
   const geometry = new BufferGeometry().setAttribute('position', new BufferAttribute(new Float32Array(3 * points), 3));
@@ -27,6 +28,7 @@ export class View {
   #stale = true;   // what depends on the scales alone has to be drawn anew
 
   constructor(canvas, invalidate) {
+    if (!document.createElement('canvas').getContext('webgl2')) throw new Error('no WebGL 2');
     this.renderer = new WebGLRenderer({ canvas, antialias: true, alpha: true });
     this.renderer.debug.checkShaderErrors = false;   // asking for errors would wait for the compiler, shader by shader
     this.scene = new Scene();
@@ -160,8 +162,8 @@ export class View {
   // What the key under the picture has to explain: [class, words].
   legend() {
     const { forces, trace, reference } = this.options, found = [], longest = `${Math.round(this.peak)} N`;
-    if (this.peak > 0 && forces === 'total') found.push(['robot', `force on robot (longest: ${longest})`], ['cable', 'force on line']);
-    if (this.peak > 0 && forces === 'parts') {
+    if (this.peak > LEAST_FORCE && forces === 'total') found.push(['robot', `force on robot (longest: ${longest})`], ['cable', 'force on line']);
+    if (this.peak > LEAST_FORCE && forces === 'parts') {
       found.push(['robot', `normal force on robot (longest: ${longest})`], ['friction', 'along the line'], ['cable', 'on line']);
     }
     if (trace && this.trace) found.push(['trace', 'path of the robot']);
@@ -243,7 +245,7 @@ export class View {
     if (nodes) this.cable.shape(nodes, this.place, this.camera.position, this.perPixel);
     this.#pose(this.robot, pose, nodes, t);
     this.#turn(t);
-    this.#forces(nodes, t);
+    this.#forces(t);
     this.#ghost(t, nodes, pose);
     if (this.trace) this.#draw(t);
     this.renderer.render(this.scene, this.camera);
@@ -329,15 +331,14 @@ export class View {
     }
   }
 
-  #forces(nodes, t) {
+  #forces(t) {
     this.arrows.clear();
     const { forces, size } = this.options, { model } = this;
-    if (forces === 'none' || !(this.peak > 0)) return;
+    if (forces === 'none' || !(this.peak > LEAST_FORCE)) return;
     const near = this.name === 'wheel', longest = near ? 0.3 : 0.6 * size, thick = near ? 0.3 : 0.8 * size;
     for (const k of model.contacts) {
-      const force = model.vector(`contact${k}.wheel.force`, t), s = model.at(`contact${k}.cable.s`, t), tangent = [0, 1, 0];
-      const point = nodes && Number.isFinite(s) ? hermite(nodes, s, [0, 0, 0], tangent) : model.vector(`cable.port[${k}].position`, t);
-      if (![...force, ...point].every(Number.isFinite)) continue;
+      const force = model.vector(`contact${k}.wheel.force`, t), { point, tangent } = touch(model, t, '', k);
+      if (![...force, ...point, ...tangent].every(Number.isFinite)) continue;
       const from = this.place(point);
       from[0] += Math.sign(this.camera.position.x - from[0]) * (near ? 0.1 : 0.12) * size;   // beside the wheel, not in it
       for (const [vector, colour] of this.#parts(force, tangent)) {
