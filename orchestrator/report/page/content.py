@@ -11,9 +11,11 @@ from orchestrator.report.drawing import legend
 from orchestrator.report.page import tables
 from orchestrator.report.page.curves import hud_of, plots_of
 from orchestrator.report.page.data import Packed, Source, pack_within
+from orchestrator.report.page.gap import Gap, gap_of
 from orchestrator.report.page.head import Head, Kind, LinePlace, Plot, Shown, Verdict
 from orchestrator.report.page.html import Html, card, table, tag
-from orchestrator.report.page.scene import clearance, robot_of, span_of
+from orchestrator.report.page.line import line_of
+from orchestrator.report.page.scene import robot_of, span_of
 from orchestrator.report.page.template import Body
 from orchestrator.report.page.tiles import header, tiles, verdict_of
 from orchestrator.runs.compare import Comparison
@@ -91,7 +93,6 @@ def _shown(run: Run, prefix: str) -> Shown:
 
 def _head(kind: Kind, run: Run, manifest: Manifest, data: Packed, plots: list[Plot]) -> Head:
     geometry = run.summary.get("geometry")
-    gap = clearance(geometry, run.table) is not None
     head = Head(
         kind=kind,
         title=manifest["resolved"]["title"],
@@ -101,7 +102,7 @@ def _head(kind: Kind, run: Run, manifest: Manifest, data: Packed, plots: list[Pl
         verdict=verdict_of(run.summary),
         line=_line(run),
         plots=plots,
-        hud=hud_of(run.table, gap) if kind != "graph" else [],
+        hud=hud_of(run.table, with_clearance=_gap(run) is not None) if kind != "graph" else [],
         limits=run.summary.get("limits", {}),
         thinned=data.note,
     )
@@ -115,6 +116,10 @@ def _place(geometry: Mapping[str, Any], run: Table) -> dict[str, Any]:
         "landing_position": geometry["landing_position"],
         "robot": robot_of(geometry, run),
     }
+
+
+def _gap(run: Run) -> Gap | None:
+    return gap_of(run.summary.get("geometry"), run.table, line_of(run.fields))
 
 
 def _line(run: Run) -> LinePlace | None:
@@ -137,7 +142,7 @@ def _top(run: Run, manifest: Manifest, data: Packed) -> Html:
     if not landing:
         verdict = _of_the_run(run)
     parts = [header(manifest["resolved"]["title"], verdict, _subtitle(run), run.safety), *_notices(run, manifest, data)]
-    return Html("".join([*parts, tiles(run.summary, run.table, run.summary.get("geometry"))]))
+    return Html("".join([*parts, tiles(run.summary, run.table, run.summary.get("geometry"), _gap(run))]))
 
 
 def _of_the_run(run: Run) -> Verdict:
@@ -196,7 +201,7 @@ def _comparison_top(found: Comparison, first: Run, manifest: Manifest, data: Pac
     kept = "every tolerance is kept" if found.passed else "a tolerance is missed"
     subtitle = f"{_subtitle(first)} · against {found.reference.kind}: {kept}"
     parts = [header(title, verdict, subtitle, said), *_notices(first, manifest, data)]
-    return Html("".join([*parts, tiles(first.summary, first.table, first.summary.get("geometry"))]))
+    return Html("".join([*parts, tiles(first.summary, first.table, first.summary.get("geometry"), _gap(first))]))
 
 
 def _comparison_card(found: Comparison) -> Html:
