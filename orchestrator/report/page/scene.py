@@ -18,6 +18,16 @@ def span_of(geometry: Geometry) -> Span:
     return Span(length, [0.0, 0.0, 0.0], [0.0, length, rise])
 
 
+def place_of(geometry: Geometry, table: Table | None = None) -> dict[str, Any]:
+    """Return span, robot and what else of a head is known from a geometry."""
+    return {
+        "span": span_of(geometry),
+        "cable_diameter": geometry["cable_diameter"],
+        "landing_position": geometry["landing_position"],
+        "robot": robot_of(geometry, table or {}),
+    }
+
+
 def robot_of(geometry: Geometry, table: Table) -> Robot:
     """Return the robot to draw: our own, or what is known of one from elsewhere."""
     robot = geometry["robot"]
