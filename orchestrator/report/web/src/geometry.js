@@ -45,8 +45,9 @@ export function rotors({ across, along, rotor_plane: z = 0 }) {
 
 const SAMPLES = 48;
 
-// Least distance between the rotors' plane and the line, along z_B, over the robot's length: {least, before, after} in
-// m, towards the left and the right support. Negative: the line cuts the plane. Null where it cannot be said.
+// Least distance between the rotors' plane and the line as it is bent, along z_B over the robot's length: {least, before,
+// after} in m, towards the left and the right support. Negative: the line cuts the plane. Null where it cannot be said.
+// The same as orchestrator/report/page/gap.py.
 export function clearance(model, t, prefix = '') {
   const { robot, line } = model.head, pose = model.pose(t, prefix);
   const nodes = line && model.line(t, prefix + model.linePrefix);
@@ -68,6 +69,15 @@ export function clearance(model, t, prefix = '') {
   }
   const least = Math.min(found.before, found.after);
   return Number.isFinite(least) ? { least, ...found } : null;
+}
+
+// Point and tangent of the line at a wheel: as the cable says, else from the shape.
+export function touch(model, t, prefix, k) {
+  const [point, tangent] = ['position', 'tangent'].map(what => model.vector(`${prefix}cable.port[${k}].${what}`, t));
+  if ([...point, ...tangent].every(Number.isFinite)) return { point, tangent };
+  const nodes = model.line(t, prefix + model.linePrefix), s = model.at(`${prefix}contact${k}.cable.s`, t);
+  if (nodes) hermite(nodes, Number.isFinite(s) ? s : contactArc(model, t, prefix), point, tangent);
+  return { point, tangent };
 }
 
 // Arc length of the line under the robot: the mean of the contacts', else where it landed.

@@ -94,7 +94,7 @@ export class SweepMap {
   // Between landings that are safe and those that are not.
   #outline(drawing) {
     const isSafe = cell => (cell.verdict ? cell.verdict === 'safe' : cell.margin >= 0);
-    const lines = outline(this.cells.filter(c => !c.box), isSafe).map(([a, b]) => `M${this.#corner(a)}L${this.#corner(b)}`);
+    const lines = outline(this.cells.filter(c => !c.box && Number.isFinite(c.margin)), isSafe).map(([a, b]) => `M${this.#corner(a)}L${this.#corner(b)}`);
     drawing.append(svg('path', { d: lines.join(''), class: 'map-outline' }));
   }
 
