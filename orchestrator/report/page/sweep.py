@@ -86,12 +86,13 @@ def _name(cell: Mapping[str, Any]) -> str:
 
 def _recorded(directory: Path, atlas: Mapping[str, Any], cell: Mapping[str, Any]) -> Recorded:
     folder = directory / cell["folder"]
-    at = (
-        f"{axis['label'].lower()} {_value(value, axis['unit'])}"
-        for axis, value in zip(atlas["axes"], cell["at"], strict=True)
-    )
-    title = f"Run {cell['run']}: {', '.join(at)}"
+    title = f"Run {cell['run']}: {_at(atlas['axes'], cell)}"
     return Recorded(_name(cell), title, read_table(folder / "results.csv"), read_json(folder / "summary.json"), folder)
+
+
+def _at(axes: Sequence[Mapping[str, Any]], cell: Mapping[str, Any]) -> str:
+    places = zip(axes, cell["at"], strict=True)
+    return ", ".join(f"{axis['label'].lower()} {_value(value, axis['unit'])}" for axis, value in places)
 
 
 def _value(value: Any, unit: str) -> str:
@@ -152,13 +153,13 @@ def _map(study: Mapping[str, Any], atlas: Mapping[str, Any], cells: Sequence[Map
     limits = atlas["limits"]
     return Map(
         title="Where it is safe to land",
-        text=" ".join(study.get("safe_ranges", [])[:1]),
+        text=lines[0] if len(lines := study.get("safe_ranges", [])) == 1 else "",
         x=axes[0],
         y=axes[1] if len(axes) > 1 else None,
         measures=[*_measures(limits)],
         limits=sorted({cell["binding"] for cell in cells if cell["binding"]}),
         limit_names={name: LABELS[name].replace("\n", " ").lower() for name in limits},
-        cells=[one for cell in cells for one in _cells(cell, axes, atlas["refined"] is not None)],
+        cells=[one for cell in cells for one in _cells(cell, axes, atlas)],
     )
 
 
@@ -176,7 +177,7 @@ def _measures(limits: Sequence[str]) -> Iterator[Measure]:
         )
 
 
-def _cells(cell: Mapping[str, Any], axes: Sequence[Axis], refined: bool) -> Iterator[dict[str, Any]]:
+def _cells(cell: Mapping[str, Any], axes: Sequence[Axis], atlas: Mapping[str, Any]) -> Iterator[dict[str, Any]]:
     """Yield a cell for each rectangle that a place stands for: one, where the outline was not refined."""
     place = {name: axis.values.index(value) for name, axis, value in zip("xy", axes, cell["at"], strict=False)}
     chance = cell["probability"]
@@ -187,10 +188,24 @@ def _cells(cell: Mapping[str, Any], axes: Sequence[Axis], refined: bool) -> Iter
         "probability": None if chance is None else chance["all"]["estimate"][0],
         "run": cell["run"],
         "open": _name(cell),
+        "text": _said(cell, atlas["axes"]),
         **{f"margin.{name}": margin for name, margin in cell["margins"].items()},
     }
-    for area in cell["areas"] if refined else [None]:
+    for area in cell["areas"] if atlas["refined"] is not None else [None]:
         yield {**place, **facts, **({"box": [edge for side in area for edge in side]} if area is not None else {})}
+
+
+def _said(cell: Mapping[str, Any], axes: Sequence[Mapping[str, Any]]) -> str:
+    """Say where a cell is and what became of its landings, in a line."""
+    place = _at(axes, cell)
+    place = place[:1].upper() + place[1:]
+    if cell["margin"] is None:
+        return f"{place}: {'failed' if cell['failed'] else 'not judged'}"
+    chance = cell["probability"]
+    likely = f", safe with probability {100.0 * chance['all']['estimate'][0]:.0f} %" if chance is not None else ""
+    what = {"safe": "safe", "unsafe": "not safe", "unclear": "not clearly safe", "none": "not judged"}[cell["verdict"]]
+    limit = LABELS[cell["binding"]].replace("\n", " ").lower()
+    return f"{place}: {what}{likely}; least margin {100.0 * cell['margin']:.0f} % ({limit})"
 
 
 # -- body ---------------------------------------------------------------------------------------------------------
@@ -205,7 +220,7 @@ def _verdict(study: Mapping[str, Any]) -> Verdict:
 def _top(study: Mapping[str, Any], head: Head) -> Html:
     content = study["content"]
     subtitle = " · ".join(str(x) for x in (content.get("scenario"), content.get("solver"), study["study"]) if x)
-    parts = [header(head.title, head.verdict, subtitle, " ".join(study.get("safe_ranges", [])[:3]))]
+    parts = [header(head.title, head.verdict, subtitle)]
     parts += [tag("p", (tag("b", "Incomplete: "), str(head.error)), class_="notice")] if head.error else []
     parts += [tag("p", head.thinned, class_="muted")] if head.thinned else []
     return Html("".join([*parts, tag("section", _tiles(study), class_="tiles", aria_label="Counts")]))
