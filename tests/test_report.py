@@ -15,7 +15,8 @@ from orchestrator.cli.printing import print_table
 from orchestrator.coupling.errors import InputError
 from orchestrator.coupling.run.compare import signal_errors
 from orchestrator.report import accuracy, plots, style
-from orchestrator.report.page import draw, legend, report
+from orchestrator.report.drawing import draw, legend
+from orchestrator.report.page import report
 from orchestrator.report.signals import extremes, flight, in_the_air, panels_for, shown, words
 from orchestrator.runs.compare import Comparison, Reference, RunErrors
 from orchestrator.runs.directory import RunDirectory
@@ -24,6 +25,8 @@ from orchestrator.runs.result import Run
 
 TIME = np.linspace(0.0, 2.0, 201)
 S = np.linspace(0.0, 200.0, 41)
+NOT_BUILT = Path(__file__).parent / "nothing"
+"""Where no interactive page was built: the pictures stand in the page."""
 Z = -0.4 * np.sin(2.0 * TIME) ** 2
 
 
@@ -323,7 +326,7 @@ def test_a_run_is_drawn_from_its_directory(tmp_path: Path):
     pictures = draw(folder)
     assert [path.name for path in pictures] == ["overview.png", "iterations.png", "shapes.png"]
     assert all(path.is_file() and path.parent == folder / "plots" for path in pictures)
-    page = report(folder).read_text(encoding="utf-8")
+    page = report(folder, NOT_BUILT).read_text(encoding="utf-8")
     assert "Made up &lt;here&gt;" in page and page.count("<img") == 3 and "contact2.normal_force" in page
 
 
@@ -332,14 +335,14 @@ def test_a_comparison_is_drawn_with_its_runs(tmp_path: Path):
     write_comparison(RunDirectory(tmp_path / "all"), comparison)
     folders = {path.parent.relative_to(tmp_path / "all").as_posix() for path in draw(tmp_path / "all")}
     assert folders == {"plots", *(f"{run.label}/plots" for run in comparison.results)}
-    page = report(tmp_path / "all").read_text(encoding="utf-8")
-    assert page.count("<img") == 4 * 2 + 5 and "iqn_ils_0.01s/plots/overview.png" in page
+    page = report(tmp_path / "all", NOT_BUILT).read_text(encoding="utf-8")
+    assert page.count("<img") == 4 * 2 + 5 and "iqn_ils_0.01s/plots/overview" in page
 
 
 def test_runs_of_a_comparison_that_was_not_finished_are_drawn(tmp_path: Path):
     write_unfinished(RunDirectory(tmp_path / "all"), [made_up(landing(), name) for name in ("a", "b")], "no reference")
     assert {path.parent.parent.name for path in draw(tmp_path / "all")} == {"a_0.01s", "b_0.01s"}
-    assert "no reference" in report(tmp_path / "all").read_text(encoding="utf-8")
+    assert "no reference" in report(tmp_path / "all", NOT_BUILT).read_text(encoding="utf-8")
 
 
 def test_a_run_of_one_point_has_a_page_without_pictures(tmp_path: Path):

@@ -88,7 +88,7 @@ def _words(source: str, reason: str) -> str:
 def _roll(landing: Landing) -> tuple[Formula, str]:
     size = _size(_spec(landing))
     _require_hanging(landing, "roll")
-    arm = min(abs(height) for height in _line_heights(landing))
+    arm = min(abs(height) for height in line_heights(landing))
     return workspace.roll(arm, size.along.value), "L_c from the wheel's mount and groove, D_Ry of the robot's size"
 
 
@@ -138,14 +138,14 @@ def _size(spec: RobotSpec) -> Size:
 
 def _require_hanging(landing: Landing, name: str) -> None:
     """Raise `NoRoom` for a robot whose centre of mass is above the line: it topples from any angle, no angle is safe."""
-    above = _robot_values(landing, "center_of_mass.z")[0] - max(_line_heights(landing))
+    above = _robot_values(landing, "center_of_mass.z")[0] - max(line_heights(landing))
     if above > 0.0:
         raise NoRoom(
             f"its centre of mass is {above:.3g} m above the line: it topples from any angle; give limits.{name}"
         )
 
 
-def _line_heights(landing: Landing) -> list[float]:
+def line_heights(landing: Landing) -> list[float]:
     """Return how high (m) the line is over the rotor plane where it lies in the groove of each wheel; negative: below it."""
     mounts = _robot_values(landing, *(f"wheel[{k + 1}].mount.z" for k in range(landing.n_wheels)))
     distance = touching_distance(contact_module(landing.contact, 0.0))

@@ -266,9 +266,15 @@ def _placed(scenario: LandingScenario, sources: Sources) -> tuple[Placement, Mes
 
 def cable_module(part: Part) -> Cable:
     """Return our cable with the parameters of `part`, at rest."""
+    cable = cable_as_given(part)
+    cable.initialize(0.0)
+    return cable
+
+
+def cable_as_given(part: Part) -> Cable:
+    """Return our cable with the parameters of `part`; it is not initialised."""
     cable = Cable()
     _assign(cable.table, cable.values, part.module)
-    cable.initialize(0.0)
     return cable
 
 

@@ -63,7 +63,7 @@ class RunDirectory:
 
     def write_manifest(self, content: Mapping[str, Any], error: str | None = None) -> None:
         """Write ``manifest.json``, the last file; with `error` the run is marked as incomplete."""
-        self.write_json("manifest.json", {"complete": error is None, "error": error, **content, **circumstances()})
+        self.write_json("manifest.json", manifest(content, error))
 
     def discard(self) -> None:
         """Remove the directory if nothing was written: its run did not come to be."""
@@ -94,6 +94,11 @@ def folder_for(path: Path, option: str) -> Path:
     except OSError as error:
         raise InputError(f"{option} {path}: cannot be made a folder ({error.strerror}); choose another") from None
     return path
+
+
+def manifest(content: Mapping[str, Any], error: str | None = None) -> dict[str, Any]:
+    """Return what a manifest says: whether all is there, or why not; what it was made from, and under which circumstances."""
+    return {"complete": error is None, "error": error, **content, **circumstances()}
 
 
 def circumstances() -> dict[str, Any]:

@@ -37,6 +37,7 @@ from orchestrator.landing import audit
 from orchestrator.landing.build import has_monolithic, problem
 from orchestrator.landing.contract import is_control, is_unused
 from orchestrator.landing.fields import cable_fields
+from orchestrator.landing.geometry import geometry
 from orchestrator.landing.impacts import Impact, impacts
 from orchestrator.landing.limits import limits_of
 from orchestrator.landing.resolve import MESH_KEYS, MESH_TOLERANCE, Landing, Variables
@@ -173,16 +174,18 @@ class LandingSystem:
 
     def split(self, table: Table) -> tuple[Fields, Table]:
         """Return the cable's shape and tension over time as arrays, and the table without them."""
-        rest = {name: values for name, values in table.items() if not name.startswith("cable.shape[")}
-        return cable_fields(table, self.landing.placement.cable_length), rest
+        rest = {name: values for name, values in table.items() if not name.startswith(("cable.shape[", "cable.node["))}
+        nodes = self.landing.mesh.nodes if self.landing.mesh is not None else None
+        return cable_fields(table, self.landing.placement.cable_length, nodes), rest
 
     def about(self, table: Table) -> dict[str, Any]:
-        """Return stiffness set and robot, and which signals an energy audit would need."""
+        """Return stiffness set, robot and geometry, and which signals an energy audit would need."""
         robot = self.scenario.robot
         energy = {"verdict": None, "missing": audit.missing(table)}
         mesh = self.landing.mesh.content() if self.landing.mesh is not None else None
         set_name = self.scenario.cable.stiffness_set
-        return {"stiffness_set": set_name, "robot": robot.model or robot.fmu, "mesh": mesh, "energy": energy}
+        about = {"stiffness_set": set_name, "robot": robot.model or robot.fmu, "mesh": mesh, "energy": energy}
+        return about | {"geometry": geometry(self.landing)}
 
     def warnings(self, table: Table) -> list[str]:
         """Return which wheels are where the mesh does not resolve what they do, a line each."""
@@ -300,7 +303,7 @@ class GraphSystem:
 
     def about(self, table: Table) -> dict[str, Any]:
         """Return nothing that only a landing has."""
-        return {"stiffness_set": None, "robot": None, "mesh": None, "energy": {}}
+        return {"stiffness_set": None, "robot": None, "mesh": None, "energy": {}, "geometry": None}
 
     def warnings(self, table: Table) -> list[str]:
         """Return nothing: what a run of a general graph should not do is not known."""
