@@ -1,0 +1,35 @@
+// Four views of a landing, and how heights and robot are scaled in each. Numbers in m, for a robot of 1.25 m.
+
+const USUAL = 1.25, STEPS = [1, 2, 5, 10, 20];
+export const FIELD = 38;   // degrees, vertical
+
+// Factor for heights in the span view: as large as the picture bears, never so that the sag looks like a fifth of the span.
+export function spanHeights(length, sag) {
+  const most = 0.2 * length / Math.max(sag, 1e-6);
+  return Math.max(1, ...STEPS.filter(k => k <= Math.min(most, 10)));
+}
+
+// Factor for the robot in the span view: 14 on 200 m.
+export const spanSize = (length, reach) => Math.max(1, Math.round(14 * length / 200 * USUAL / Math.max(reach, 0.2)));
+
+// {target, eye, heights, size, follow}: where to look, from where, and the scales. `at` is the point of landing.
+export function camera(name, { at: [x, y, z], reach, hangs, span, sag, aspect }) {
+  const k = reach / USUAL, sign = hangs ? 1 : -1;
+  const close = { heights: 1, size: 1, follow: false };
+  // a narrow window sees less to the sides: step back until the robot fits
+  const back = k * Math.max(1, 1.15 / aspect);
+  if (name === 'side') return { ...close, target: [x, y, z - sign * 0.15 * k], eye: [x + 3.0 * back, y, z - sign * 0.15 * k] };
+  if (name === 'wheel') return { ...close, follow: true, target: [x, y, z + 0.03], eye: [x + 0.5, y - 0.62, z + 0.2] };
+  if (name === 'span' && span) return wholeSpan(span, sag, reach, aspect);
+  return { ...close, target: [x, y, z - sign * 0.1 * k], eye: [x + 2.35 * back, y - 1.5 * back, z + (hangs ? 0.42 : 0.75) * back] };
+}
+
+// The whole line fits, whatever the window: distance from the narrower of the two field angles.
+function wholeSpan({ left, right, length }, sag, reach, aspect) {
+  const heights = spanHeights(length, sag), size = spanSize(length, reach), tangent = Math.tan(FIELD * Math.PI / 360);
+  const middle = [0, 1, 2].map(c => (left[c] + right[c]) / 2), deep = heights * sag + reach * size;
+  const rise = Math.abs(right[2] - left[2]);
+  const far = 1.1 * Math.max(length / 2 / (tangent * aspect), (deep + rise) / 1.5 / tangent);
+  const target = [middle[0], middle[1], middle[2] - 0.5 * deep];
+  return { heights, size, follow: false, target, eye: [target[0] + far, target[1] - 0.12 * far, target[2] + 0.14 * far] };
+}
