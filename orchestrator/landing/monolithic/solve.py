@@ -87,10 +87,16 @@ class Integrator:
     Parameters
     ----------
     refinement : the intervals between output times are divided into at least so many steps, or a multiple of it
-    start_time : s
+    start_time : s; None: not begun, to be packed alone (`starts.py`)
     """
 
-    def __init__(self, problem: Problem, tolerance: float = TOLERANCE, refinement: int = 1, start_time: float = 0.0):
+    def __init__(
+        self,
+        problem: Problem,
+        tolerance: float = TOLERANCE,
+        refinement: int = 1,
+        start_time: float | None = 0.0,
+    ):
         self.problem = problem
         cable, robot = problem.cable, problem.robot
         self.method = collocation(cable["spectral_radius"])
@@ -109,7 +115,7 @@ class Integrator:
         event = EVENT * (tolerance / TOLERANCE) ** 0.5
         self.options = np.array([0.0, 0.0, longest, float(refinement)])
         self.control = np.array([0.02 * longest, longest, tolerance, event, NEWTON, 0.0, 0.0, 0.0, 0.0])
-        if begin(self.system, self.state, start_time, self.space, self.work) != OK:
+        if start_time is not None and begin(self.system, self.state, start_time, self.space, self.work) != OK:
             raise ModuleError("monolithic: the contact law fails at the start; check the initial pose of the robot")
 
     @property
@@ -167,7 +173,8 @@ class _Recorder:
         """Write row `i` from the present state."""
         one, shown = self.integrator, self.shown
         show(one.system, one.state, shown, one.space, one.work)
-        cable = np.concatenate([part.ravel() for part in (shown.ports, shown.cable, shown.shape)])
+        nodes = one.problem.cable.nodes_at(one.state.cable)
+        cable = np.concatenate([part.ravel() for part in (shown.ports, shown.cable, shown.shape, nodes)])
         self.cable_rows[i], self.robot_rows[i] = cable[self.cable_at], shown.robot[self.robot_at]
         self.contact_rows[i] = shown.contacts[:, : len(CONTACT)]
 

@@ -31,8 +31,10 @@ function beside(model, panel, signal, original) {
     const values = shown(model.get(`${label}/${signal.name}`), panel);
     found.push({ ...signal, values, label: label === 'reference' ? 'reference' : label, kind: label === 'reference' ? 'reference' : 'other' });
   }
-  const before = original?.get(signal.name);
-  if (before?.length === model.time.length) found.push({ ...signal, values: shown(before, panel), label: 'as simulated', kind: 'reference' });
+  if (original?.has(signal.name)) {
+    const before = Float64Array.from(model.time, t => original.at(signal.name, t));   // its steps may be others
+    found.push({ ...signal, values: shown(before, panel), label: 'as simulated', kind: 'reference' });
+  }
   return found;
 }
 
