@@ -22,43 +22,10 @@ from orchestrator.runs.compare import Comparison, Reference, RunErrors
 from orchestrator.runs.directory import RunDirectory
 from orchestrator.runs.files import write_comparison, write_run, write_unfinished
 from orchestrator.runs.result import Run
+from tests.made_up import TIME, S, Z, kinked_shape, landing, made_up
 
-TIME = np.linspace(0.0, 2.0, 201)
-S = np.linspace(0.0, 200.0, 41)
 NOT_BUILT = Path(__file__).parent / "nothing"
 """Where no interactive page was built: the pictures stand in the page."""
-Z = -0.4 * np.sin(2.0 * TIME) ** 2
-
-
-def landing(n_wheels: int = 1, shift: float = 0.0) -> dict[str, np.ndarray]:
-    """The signals of a landing that touches at 0.5 s and is in the air from 1.2 to 1.5 s, `shift` too high."""
-    closed = (TIME >= 0.5) & ~((TIME > 1.2) & (TIME < 1.5))
-    table = {"time": TIME, "robot.body.position.y": np.full(201, 20.0), "robot.body.position.z": 3.0 + Z + shift}
-    table |= {f"robot.{name}": k * 0.01 * np.sin(TIME) for k, name in enumerate(("roll", "pitch", "yaw"))}
-    for k in range(1, n_wheels + 1):
-        table |= {f"contact{k}.normal_force": np.where(closed, 400.0 + k, 0.0), f"contact{k}.status": 1.0 * closed}
-    return table | {"cable.tension_mid": 22000.0 + 1000.0 * np.sin(TIME)}
-
-
-def kinked_shape() -> dict[str, np.ndarray]:
-    """A cable that hangs in a parabola and is pulled down under a wheel at 20 m."""
-    hanging = -2.0 * (1.0 - (S / 100.0 - 1.0) ** 2)
-    kink = np.minimum(S / 20.0, (200.0 - S) / 180.0)
-    position = np.stack([np.stack([0.0 * S, S, hanging + z * kink], axis=-1) for z in Z])
-    return {"time": TIME, "arc_length": S, "position": position, "tension": np.full((201, 41), 22000.0)}
-
-
-def made_up(table: dict[str, np.ndarray], master: str = "iqn_ils", macro_step: float = 0.01, **summary: object) -> Run:
-    """A run with these signals."""
-    n = len(table["time"]) - 1
-    steps = {"time": table["time"][1:], "iterations": 2 + np.arange(n) % 3, "converged": np.arange(n) != 7}
-    content = {
-        "scenario": "made_up", "master": master, "macro_step": macro_step, "units": {}, "tolerances": {}, "steps": n,
-        "estimated_error": {}, "unconverged_steps": 1, "left_the_groove": [], "verdict": "within",
-        "iterations_per_step": 3.0, "wall_s": 1.0 + macro_step, "solves": {"cable": int(1 / macro_step)},
-    }  # fmt: skip
-    manifest = {"complete": True, "error": None, "resolved": {"title": "Made up <here>"}}
-    return Run(table, steps, {}, content | summary, manifest)
 
 
 def held_together(masters: list[str], macro_steps: list[float]) -> Comparison:

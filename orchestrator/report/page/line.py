@@ -59,9 +59,11 @@ def line_of(fields: Mapping[str, np.ndarray], every: float = FRAME) -> Line | No
 
 def frames(time: np.ndarray, every: float) -> np.ndarray:
     """Return the rows of a time (n,) that are nearest to multiples of `every`, each once; first and last among them."""
+    if len(time) < 2:
+        return np.arange(len(time))
     wanted = np.arange(time[0], time[-1] + 0.5 * every, every)
-    after = np.clip(np.searchsorted(time, wanted), 1, max(len(time) - 1, 1))
-    before_is_nearer = wanted - time[after - 1] < time[np.minimum(after, len(time) - 1)] - wanted
+    after = np.clip(np.searchsorted(time, wanted), 1, len(time) - 1)
+    before_is_nearer = wanted - time[after - 1] < time[after] - wanted
     return np.unique(np.concatenate([[0], after - before_is_nearer, [len(time) - 1]]))
 
 

@@ -78,7 +78,7 @@ export class App {
     this.t = Math.min(Math.max(this.t, model.start), model.end);
     const { work, stage, plots } = this.places;
     stage.hidden = !this.has.replay;
-    plots.hidden = !(model.head.plots?.length && model.time.length);
+    plots.hidden = !(model.head.plots?.length && model.time.length > 1);
     work.classList.toggle('single', stage.hidden || plots.hidden);
     work.hidden = stage.hidden && plots.hidden;
     this.#tell('show', model, note);

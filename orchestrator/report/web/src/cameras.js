@@ -12,16 +12,16 @@ export function spanHeights(length, sag) {
 // Factor for the robot in the span view: 14 on 200 m.
 export const spanSize = (length, reach) => Math.max(1, Math.round(14 * length / 200 * USUAL / Math.max(reach, 0.2)));
 
-// {target, eye, heights, size, follow}: where to look, from where, and the scales. `at` is the point of landing.
-export function camera(name, { at: [x, y, z], reach, hangs, span, sag, aspect }) {
-  const k = reach / USUAL, sign = hangs ? 1 : -1;
+// {target, eye, heights, size, follow}: where to look, from where, and the scales. `at` is the point of landing,
+// `low` and `high` the heights between which the robot moves, its own size included.
+export function camera(name, { at: [x, y, z], low, high, reach, hangs, span, sag, aspect }) {
   const close = { heights: 1, size: 1, follow: false };
-  // a narrow window sees less to the sides: step back until the robot fits
-  const back = k * Math.max(1, 1.15 / aspect);
-  if (name === 'side') return { ...close, target: [x, y, z - sign * 0.15 * k], eye: [x + 3.0 * back, y, z - sign * 0.15 * k] };
   if (name === 'wheel') return { ...close, follow: true, target: [x, y, z + 0.03], eye: [x + 0.5, y - 0.62, z + 0.2] };
   if (name === 'span' && span) return wholeSpan(span, sag, reach, aspect);
-  return { ...close, target: [x, y, z - sign * 0.1 * k], eye: [x + 2.35 * back, y - 1.5 * back, z + (hangs ? 0.42 : 0.75) * back] };
+  const tangent = Math.tan(FIELD * Math.PI / 360), middle = (low + high) / 2;
+  const distance = Math.max((high - low) / 2 / tangent, 0.62 * reach / (tangent * aspect)) + 0.35 * reach;
+  const ways = name === 'side' ? [1, 0, 0] : [0.8, -0.5, hangs ? 0.33 : 0.3];
+  return { ...close, target: [x, y, middle], eye: [x, y, middle].map((v, c) => v + distance * ways[c]) };
 }
 
 // The whole line fits, whatever the window: distance from the narrower of the two field angles.

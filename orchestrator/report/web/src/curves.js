@@ -26,17 +26,16 @@ export function curves(model, panel, mode, original = null) {
 
 // The reference, other runs of a comparison, and the landing as it was simulated where a what-if is shown.
 function beside(model, panel, signal, original) {
-  const found = [], labels = others(model, signal.name);
-  for (const label of labels) {
-    const values = shown(model.get(`${label}/${signal.name}`), panel);
-    found.push({ ...signal, values, label: label === 'reference' ? 'reference' : label, kind: label === 'reference' ? 'reference' : 'other' });
-  }
-  if (original?.has(signal.name)) {
-    const before = Float64Array.from(model.time, t => original.at(signal.name, t));   // its steps may be others
-    found.push({ ...signal, values: shown(before, panel), label: 'as simulated', kind: 'reference' });
-  }
+  const found = others(model, signal.name).map(label => {
+    const values = shown(model.atOwnTimes(`${label}/${signal.name}`), panel);
+    return { ...signal, values, label, kind: label === 'reference' ? 'reference' : 'other' };
+  });
+  const before = original?.get(signal.name) && shown(resampled(original, signal.name, model.time), panel);
+  if (before) found.push({ ...signal, values: before, label: 'as simulated', kind: 'reference' });
   return found;
 }
+
+const resampled = (model, name, times) => Array.from(times, t => (t > model.end ? NaN : model.at(name, t)));
 
 // Labels of the runs that carry the signal too, the reference first.
 function others(model, name) {
@@ -44,17 +43,17 @@ function others(model, name) {
   for (const key of Object.keys(model.arrays)) {
     if (!key.startsWith(model.prefix) || !key.endsWith(end)) continue;
     const label = key.slice(model.prefix.length, -end.length);
-    if (label && !label.startsWith('difference') && !model.head.landings?.[label] && model.arrays[key].length === model.time.length) found.push(label);
+    if (label && !label.startsWith('difference') && !model.head.landings?.[label]) found.push(label);
   }
   return found.sort((a, b) => (b === 'reference') - (a === 'reference'));
 }
 
 function differences(model, panel, signal) {
   const plain = { factor: panel.factor }, exact = model.get(`difference/${signal.name}`);
-  const own = model.get(signal.name), theirs = model.get(`reference/${signal.name}`);
-  if (!exact && theirs?.length !== own.length) return [];
-  const values = exact ? shown(exact, plain) : minus(shown(own, plain), shown(theirs, plain));
-  return [{ ...signal, values, kind: 'difference' }];
+  if (exact) return [{ ...signal, values: shown(model.atOwnTimes(`difference/${signal.name}`), plain), kind: 'difference' }];
+  if (!model.has(`reference/${signal.name}`)) return [];
+  const own = model.get(signal.name), theirs = model.atOwnTimes(`reference/${signal.name}`);
+  return [{ ...signal, values: minus(shown(own, plain), shown(theirs, plain)), kind: 'difference' }];
 }
 
 export function extent(lists) {
@@ -94,6 +93,7 @@ export function powerText(exponent) {
 }
 
 export const axisText = (value, step) => {
+  if (step < 1e-4) return value === 0 ? '0' : value.toExponential(1).replace('-', MINUS_SIGN);
   const digits = step >= 1 ? 0 : Math.min(6, Math.ceil(-Math.log10(step) - 1e-9));
   return value.toFixed(digits).replace('-', MINUS_SIGN);
 };

@@ -45,24 +45,39 @@ export function rotors({ across, along, rotor_plane: z = 0 }) {
 
 const SAMPLES = 48;
 
-// Least distance between the rotors' plane and the line, along z_B, over the robot's length: {least, before, after} in
-// m, towards the left and the right support. Negative: the line cuts the plane. Null where it cannot be said.
+// Least distance between the rotors' plane and the line as it is bent, along z_B over the robot's length: {least, before,
+// after} in m, towards the left and the right support. Negative: the line cuts the plane. Null where it cannot be said.
+// The same as orchestrator/report/page/gap.py.
 export function clearance(model, t, prefix = '') {
   const { robot, line } = model.head, pose = model.pose(t, prefix);
   const nodes = line && model.line(t, prefix + model.linePrefix);
   if (!robot?.along || !pose || !nodes) return null;
   const sign = robot.layout === 'bottom' ? -1 : 1, half = robot.along / 2, matrix = rotation(pose.angles);
-  const middle = contactArc(model, t, prefix), found = { before: Infinity, after: Infinity };
-  for (let i = 0, p = [0, 0, 0]; i <= SAMPLES; i++) {
+  const middle = contactArc(model, t, prefix), found = { before: Infinity, after: Infinity }, p = [0, 0, 0];
+  const take = (y, z) => {
+    const gap = sign * (z - (robot.rotor_plane ?? 0)), side = y < 0 ? 'before' : 'after';
+    if (gap < found[side]) found[side] = gap;
+  };
+  let last = null;
+  for (let i = 0; i <= SAMPLES; i++) {
     const s = middle + 1.3 * half * (2 * i / SAMPLES - 1);
     if (s < nodes.s[0] || s > nodes.s[nodes.s.length - 1]) continue;
     const [, y, z] = toBody(pose, hermite(nodes, s, p), matrix);
-    if (Math.abs(y) > half) continue;
-    const gap = sign * (z - (robot.rotor_plane ?? 0)), side = y < 0 ? 'before' : 'after';
-    if (gap < found[side]) found[side] = gap;
+    for (const rim of [-half, half]) if (last && (last.y - rim) * (y - rim) < 0) take(rim, last.z + (z - last.z) * (rim - last.y) / (y - last.y));
+    if (Math.abs(y) <= half) take(y, z);
+    last = { y, z };
   }
   const least = Math.min(found.before, found.after);
   return Number.isFinite(least) ? { least, ...found } : null;
+}
+
+// Point and tangent of the line at a wheel: as the cable says, else from the shape.
+export function touch(model, t, prefix, k) {
+  const [point, tangent] = ['position', 'tangent'].map(what => model.vector(`${prefix}cable.port[${k}].${what}`, t));
+  if ([...point, ...tangent].every(Number.isFinite)) return { point, tangent };
+  const nodes = model.line(t, prefix + model.linePrefix), s = model.at(`${prefix}contact${k}.cable.s`, t);
+  if (nodes) hermite(nodes, Number.isFinite(s) ? s : contactArc(model, t, prefix), point, tangent);
+  return { point, tangent };
 }
 
 // Arc length of the line under the robot: the mean of the contacts', else where it landed.

@@ -94,7 +94,7 @@ export class SweepMap {
   // Between landings that are safe and those that are not.
   #outline(drawing) {
     const isSafe = cell => (cell.verdict ? cell.verdict === 'safe' : cell.margin >= 0);
-    const lines = outline(this.cells.filter(c => !c.box), isSafe).map(([a, b]) => `M${this.#corner(a)}L${this.#corner(b)}`);
+    const lines = outline(this.cells.filter(c => !c.box && Number.isFinite(c.margin)), isSafe).map(([a, b]) => `M${this.#corner(a)}L${this.#corner(b)}`);
     drawing.append(svg('path', { d: lines.join(''), class: 'map-outline' }));
   }
 
@@ -163,7 +163,7 @@ export class SweepMap {
     this.said.textContent = `${cell.words} …`;
     try {
       const opened = await this.app.open(cell);
-      this.said.textContent = opened ? `${cell.words}: shown above` : `${cell.words}: its signals were not kept, and it cannot be solved here`;
+      this.said.textContent = opened ? `${cell.words}: shown in the replay and the plots` : `${cell.words}: its signals were not kept, and it cannot be solved here`;
       return opened;
     } catch (error) {
       this.said.textContent = `${cell.words}: ${error.message ?? error}`;

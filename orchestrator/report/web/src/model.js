@@ -71,6 +71,8 @@ export const chord = (span, y) => {
   return z0 + (z1 - z0) * (y - y0) / (y1 - y0 || 1);
 };
 
+const sameTimes = (a, b) => a.length === b.length && a.every((t, i) => t === b[i]);
+
 // Signals, line and what is said about them; nothing in it changes.
 export class Model {
   constructor(head, arrays, prefix = '') {
@@ -89,9 +91,19 @@ export class Model {
   // Another landing that this page carries; its arrays have a prefix of their own.
   other(prefix, head = {}) { return new Model({ ...this.head, ...head }, this.arrays, prefix); }
 
+  // Times of a signal: those of the run that its name begins with (`reference/…`), else this run's.
+  timeOf(name) { return this.get(`${name.slice(0, name.lastIndexOf('/') + 1)}time`) ?? this.time; }
+
   at(name, t) {
     const values = this.get(name);
-    return values?.length ? interpolate(values, ...locate(this.time, t)) : NaN;
+    return values?.length ? interpolate(values, ...locate(this.timeOf(name), t)) : NaN;
+  }
+
+  // A signal at this run's own times, whatever the times it was recorded at.
+  atOwnTimes(name) {
+    const values = this.get(name), times = this.timeOf(name);
+    if (times === this.time || !values || sameTimes(times, this.time)) return values;
+    return Float64Array.from(this.time, t => (t > times[times.length - 1] ? NaN : interpolate(values, ...locate(times, t))));
   }
 
   vector(name, t, otherwise = NaN) {

@@ -41,6 +41,9 @@ export class Plots {
 
   theme() { this.build(); }
 
+  // Draw at once what else would be drawn after this task: for paper.
+  flush() { for (const { plot } of this.list) plot.batch(() => {}); }
+
   build() {
     const kept = this.zoomed;
     for (const { plot } of this.list) plot.destroy();

@@ -9,6 +9,7 @@ export function printable(app) {
     app.play(false);
     app.theme('light');
     app.draw();
+    app.plots?.flush();
     for (const canvas of document.querySelectorAll('canvas')) picture(canvas);
   });
   addEventListener('afterprint', () => {

@@ -5,8 +5,8 @@ const VISIBLE = { length: 0.08, angle: 0.15 };   // m, rad: what a difference ma
 // Largest difference of position, m, and of attitude, rad, over the run.
 export function difference(model) {
   const worst = names => Math.max(...names.map(name => {
-    const ours = model.get(name), theirs = model.get(`reference/${name}`);
-    if (!ours || !theirs || ours.length !== theirs.length) return 0;
+    const ours = model.get(name), theirs = model.atOwnTimes(`reference/${name}`);
+    if (!ours || !theirs) return 0;
     let found = 0;
     for (let i = 0; i < ours.length; i++) {
       const d = Math.abs(ours[i] - theirs[i]);

@@ -53,16 +53,24 @@ export function buildRobot(spec, palette) {
   for (const wheel of size.wheels) addFork(parts, wheel, size);
   parts.into(group, palette);
   group.add(...wheels.map(w => w.group), ...blades);
-  return { group, wheels: wheels.map(w => w.turning), blades, reach: Math.max(size.across, size.along) };
+  const reach = Math.max(size.across, size.along), [low, high] = heightsOf(size);
+  return { group, wheels: wheels.map(w => w.turning), blades, reach, low, high };
 }
 
-// The specification with usual values for what it does not say.
+// The specification, with usual values for what it does not say: of a robot from elsewhere much is not known.
 function complete(spec) {
-  const wheels = (spec.wheels ?? []).map(w => ({ radius: 0.075, width: 0.08, groove_angle: 1.745, mount: [0, 0, 0], ...w }));
-  const across = spec.across ?? 0.8, along = spec.along ?? 0.8, z = wheels.map(w => w.mount[2]);
-  const radius = Math.max(0.02, ...wheels.map(w => w.radius));
+  const known = values => Object.fromEntries(Object.entries(values ?? {}).filter(([, value]) => value !== null && value !== undefined));
+  const wheels = (spec.wheels ?? []).map(w => ({ radius: 0.075, width: 0.08, groove_angle: 1.745, mount: [0, 0, 0], ...known(w) }));
+  const size = { across: 0.8, along: 0.8, height: 0.6, rotor_plane: 0, layout: 'top', ...known(spec) };
+  const z = wheels.map(w => w.mount[2]), radius = Math.max(0.02, ...wheels.map(w => w.radius));
   const top = wheels.length ? Math.max(...z) + radius : 0.2, line = wheels.length ? Math.min(...z) - 0.7 * radius : -0.2;
-  return { height: 0.6, rotor_plane: 0, below_line: null, ...spec, across, along, wheels, radius, top, line };
+  return { below_line: 0.25, ...size, wheels, radius, top, line };
+}
+
+// Lowest and highest point of what is drawn, from b.
+function heightsOf({ layout, height, below_line: below, line, top, rotor_plane: z }) {
+  if (layout === 'bottom') return [line - below, z + 0.03];
+  return [Math.min(top - height, z - 0.3), Math.max(top, z + 0.03)];
 }
 
 function addRotors(parts, size, palette) {
@@ -99,7 +107,7 @@ function addHangingBody(parts, { across, along, height, top, rotor_plane: z }) {
 
 // Stands on the line: body under the rotors, battery packs on both sides below the line.
 function addStandingBody(parts, { across, along, height, below_line: below, line, rotor_plane: z, wheels, radius }) {
-  const low = line - (below ?? 0.25), body = 0.6 * (z - line - radius), y = reachOf(wheels, along);
+  const low = line - below, body = 0.6 * (z - line - radius), y = reachOf(wheels, along);
   parts.add('shell', new CapsuleGeometry(0.06, y, 6, 20).scale(1.5, 1, 0.75), 0, 0, z - 0.06);
   parts.add('frame', new BoxGeometry(0.09, y + 0.1, 0.035), 0, 0, z - 0.115);
   const tall = Math.min(0.45 * height, 0.8 * (line - low)), x = Math.max(0.24 * across, 0.14);

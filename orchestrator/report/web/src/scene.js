@@ -8,13 +8,14 @@ import { Arrows } from './arrows.js';
 import { Cable, strandMaterial } from './cable.js';
 import { camera, FIELD } from './cameras.js';
 import { css } from './dom.js';
-import { contactArc, spin } from './geometry.js';
+import { contactArc, spin, touch } from './geometry.js';
 import { chord, hermite, locate } from './model.js';
 import { difference, exaggerated } from './reference.js';
 import { buildRobot, materials } from './robot.js';
 import { Ground, groundBelow, supportPalette, Supports } from './supports.js';
 
-const MOST_ARROWS = 32, BLADE_SPEED = 31;   // rad/s: to be seen, not to be true
+const MOST_ARROWS = 32, LEAST_FORCE = 0.01,   // N: less is noise
+   BLADE_SPEED = 31;   // rad/s: to be seen, not to be true
 
 const line = (material, points) => {
   const geometry = new BufferGeometry().setAttribute('position', new BufferAttribute(new Float32Array(3 * points), 3));
@@ -27,6 +28,7 @@ export class View {
   #stale = true;   // what depends on the scales alone has to be drawn anew
 
   constructor(canvas, invalidate) {
+    if (!document.createElement('canvas').getContext('webgl2')) throw new Error('no WebGL 2');
     this.renderer = new WebGLRenderer({ canvas, antialias: true, alpha: true });
     this.renderer.debug.checkShaderErrors = false;   // asking for errors would wait for the compiler, shader by shader
     this.scene = new Scene();
@@ -133,7 +135,7 @@ export class View {
   // The reference: a pale robot and line, its difference from the run exaggerated until it can be seen.
   #reference(model) {
     if (!model.hasReference) { this.#replace('ghostRobot', null); this.#replace('ghostLine', null); this.options.reference = 0; return; }
-    this.pale ??= new MeshPhongMaterial({ transparent: true, opacity: 0.4, depthWrite: false });
+    this.pale ??= new MeshPhongMaterial({ transparent: true, opacity: 0.35, depthWrite: false, polygonOffset: true, polygonOffsetFactor: 1, polygonOffsetUnits: 4 });
     const pale = new Proxy({}, { get: () => this.pale });
     if (!this.ghostRobot && model.head.robot) this.#replace('ghostRobot', buildRobot(model.head.robot, pale));
     const nodes = model.line(model.start, `reference/${model.linePrefix}`), radius = (model.head.cable_diameter ?? 0.02) / 2;
@@ -160,8 +162,8 @@ export class View {
   // What the key under the picture has to explain: [class, words].
   legend() {
     const { forces, trace, reference } = this.options, found = [], longest = `${Math.round(this.peak)} N`;
-    if (this.peak > 0 && forces === 'total') found.push(['robot', `force on robot (longest: ${longest})`], ['cable', 'force on line']);
-    if (this.peak > 0 && forces === 'parts') {
+    if (this.peak > LEAST_FORCE && forces === 'total') found.push(['robot', `force on robot (longest: ${longest})`], ['cable', 'force on line']);
+    if (this.peak > LEAST_FORCE && forces === 'parts') {
       found.push(['robot', `normal force on robot (longest: ${longest})`], ['friction', 'along the line'], ['cable', 'on line']);
     }
     if (trace && this.trace) found.push(['trace', 'path of the robot']);
@@ -200,14 +202,26 @@ export class View {
     const { head } = this.model, at = this.rest ? hermite(this.rest, contactArc(this.model, this.model.start)) : [0, 0, 0];
     const pose = this.model.pose(this.model.start);
     this.home = this.rest ? at : pose?.position ?? at;
+    const { low = -0.5, high = 0.5, reach = 1.25 } = this.robot ?? {}, [least, most] = this.#heights();
     return {
-      at: this.home, reach: this.robot?.reach ?? 1.25, hangs: head.robot?.layout !== 'bottom', span: this.span, sag: this.sag,
-      aspect: this.camera.aspect,
+      at: this.home, low: least + low, high: Math.max(most + high, this.home[2]), reach, hangs: head.robot?.layout !== 'bottom',
+      span: this.span, sag: this.sag, aspect: this.camera.aspect,
     };
   }
 
+  // Least and largest height of the robot over the landing.
+  #heights() {
+    const found = Array.from(this.model.get('robot.body.position.z') ?? []).filter(Number.isFinite);
+    if (!found.length) return [this.home[2], this.home[2]];
+    return [found.reduce((a, b) => Math.min(a, b)), found.reduce((a, b) => Math.max(a, b))];
+  }
+
   set(options) {
+    const before = this.place(this.home);
     Object.assign(this.options, options);
+    this.#shift(this.place(this.home).map((x, c) => x - before[c]));   // the robot stays in the picture
+    if (!this.follow) this.followed = this.place(this.home);
+    else this.followed = this.followed.map((x, c) => x + this.place(this.home)[c] - before[c]);
     this.#stale = true;
     this.invalidate();
   }
@@ -231,7 +245,7 @@ export class View {
     if (nodes) this.cable.shape(nodes, this.place, this.camera.position, this.perPixel);
     this.#pose(this.robot, pose, nodes, t);
     this.#turn(t);
-    this.#forces(nodes, t);
+    this.#forces(t);
     this.#ghost(t, nodes, pose);
     if (this.trace) this.#draw(t);
     this.renderer.render(this.scene, this.camera);
@@ -239,9 +253,14 @@ export class View {
 
   #followTo(point) {
     if (!this.follow || !point) return;
-    const step = new Vector3(...point).sub(new Vector3(...this.followed));
-    this.controls.target.add(step); this.camera.position.add(step);
-    this.followed = point;
+    const now = this.place(point);
+    this.#shift(now.map((x, c) => x - this.followed[c]));
+    this.followed = now;
+  }
+
+  #shift(step) {
+    this.controls.target.add(new Vector3(...step));
+    this.camera.position.add(new Vector3(...step));
   }
 
   // What does not move with time, at the present scales: line at rest, path, ground.
@@ -312,15 +331,14 @@ export class View {
     }
   }
 
-  #forces(nodes, t) {
+  #forces(t) {
     this.arrows.clear();
     const { forces, size } = this.options, { model } = this;
-    if (forces === 'none' || !(this.peak > 0)) return;
+    if (forces === 'none' || !(this.peak > LEAST_FORCE)) return;
     const near = this.name === 'wheel', longest = near ? 0.3 : 0.6 * size, thick = near ? 0.3 : 0.8 * size;
     for (const k of model.contacts) {
-      const force = model.vector(`contact${k}.wheel.force`, t), s = model.at(`contact${k}.cable.s`, t), tangent = [0, 1, 0];
-      const point = nodes && Number.isFinite(s) ? hermite(nodes, s, [0, 0, 0], tangent) : model.vector(`cable.port[${k}].position`, t);
-      if (![...force, ...point].every(Number.isFinite)) continue;
+      const force = model.vector(`contact${k}.wheel.force`, t), { point, tangent } = touch(model, t, '', k);
+      if (![...force, ...point, ...tangent].every(Number.isFinite)) continue;
       const from = this.place(point);
       from[0] += Math.sign(this.camera.position.x - from[0]) * (near ? 0.1 : 0.12) * size;   // beside the wheel, not in it
       for (const [vector, colour] of this.#parts(force, tangent)) {

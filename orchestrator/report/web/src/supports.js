@@ -87,7 +87,7 @@ uniform vec3 line; uniform vec3 plain; uniform float cell; uniform float far;
 void main() {
   vec2 at = place.xy / cell, width = fwidth(at);
   vec2 near = abs(fract(at - 0.5) - 0.5) / max(width, vec2(1e-6));
-  vec2 ink = (1.0 - clamp(near - 0.4, 0.0, 1.0)) * (1.0 - smoothstep(0.15, 0.5, width));
+  vec2 ink = 0.8 * (1.0 - clamp(near, 0.0, 1.0)) * (1.0 - smoothstep(0.15, 0.5, width));
   float fade = 1.0 - smoothstep(0.15 * far, far, distance(place, cameraPosition));
   gl_FragColor = vec4(mix(plain, line, max(ink.x, ink.y)), fade);
 }`;
