@@ -1,0 +1,216 @@
+// "What if": the landing with another mass, speed, friction or damping, elsewhere on the span or with another robot, solved
+// in the page by the kernels of the monolithic solver. What is shown then follows it, and says so.
+import { element, fixed } from './dom.js';
+import { judge, limitsFor, TENSION_ALONG } from './judge.js';
+import { Model, unpack } from './model.js';
+
+const FRAME = 0.02;   // s between shapes of the line
+const BLOCKS = 'whatif.starts';
+const INPUTS = /^robot\.(thrust|torque\.|wheel\[\d+\]\.drive_torque)/;
+const VERDICTS = { true: ['Safe to land', 'safe'], false: ['Not safe to land', 'unsafe'], null: ['Safety not judged', 'none'] };
+
+// Fill the place of the what-if; nothing where the page has none, a word where there is a reason.
+export function whatif(app) {
+  const place = document.getElementById('whatif'), about = app.original.head.whatif;
+  if (!place || !about) return null;
+  place.hidden = false;
+  if (about.reason || !about.starts?.length) {
+    place.replaceChildren(element('b', { textContent: 'What if' }), element('span', { className: 'muted', textContent: `not here: ${about.reason}` }));
+    return null;
+  }
+  return new WhatIf(app, place, about);
+}
+
+class WhatIf {
+  #worker = null; #waiting = new Map(); #id = 0;
+
+  constructor(app, place, about) {
+    this.app = app; this.place = place; this.about = about; this.start = about.starts[0];
+    this.wishes = this.#own();
+    this.#build();
+    app.solver = cell => this.landing(cell);
+    app.page.whatif = { set: (name, value) => this.set(name, value), choose: i => this.choose(i), back: () => this.back(), state: () => this.state() };
+  }
+
+  #own() { return Object.fromEntries(this.start.sliders.map(slider => [slider.name, slider.value])); }
+
+  get changed() {
+    const own = this.#own();
+    return this.start !== this.about.starts[0] || Object.keys(own).some(name => own[name] !== this.wishes[name]);
+  }
+
+  // -- what stands in the page --------------------------------------------------------------------------------------
+
+  #build() {
+    this.said = element('p', { className: 'said', role: 'status' });
+    this.again = element('button', { type: 'button', textContent: 'Back to the run', hidden: true, onclick: () => this.back() });
+    this.controls = element('div', { className: 'wishes' });
+    const title = element('b', { textContent: 'What if' });
+    this.place.replaceChildren(title, this.controls, this.again, this.said);
+    this.place.setAttribute('aria-label', 'What if');
+    this.#fill();
+  }
+
+  #fill() {
+    const choices = this.about.starts.length > 1 ? [this.#choice()] : [];
+    this.inputs = {};
+    this.controls.replaceChildren(...choices, ...this.start.sliders.map(slider => this.#slider(slider)));
+  }
+
+  #choice() {
+    const first = this.about.starts[0], select = element('select', { oninput: () => this.choose(Number(select.value)) });
+    const option = (start, i) => element('option', { value: String(i), textContent: i ? named(start, first) : `${first.robot} at ${+first.position.toFixed(3)} m`, selected: start === this.start });
+    select.append(...this.about.starts.map(option));
+    return element('label', {}, 'landing ', select);
+  }
+
+  #slider(slider) {
+    const { name, label, unit, least, most, step } = slider, digits = Math.max(0, Math.ceil(-Math.log10(step) - 1e-9));
+    const output = element('output', {}), show = value => { output.textContent = `${fixed(value, digits)}${unit === '1' ? '' : ` ${unit}`}`; };
+    const input = element('input', { type: 'range', min: String(least), max: String(most), step: 'any' });
+    input.value = String(this.wishes[name]);
+    input.setAttribute('aria-label', `${label}${unit === '1' ? '' : `, ${unit}`}`);
+    input.dataset.ownKeys = '';
+    input.addEventListener('input', () => this.set(name, onStep(slider, Number(input.value))));
+    input.addEventListener('keydown', event => {
+      const by = { ArrowRight: 1, ArrowUp: 1, ArrowLeft: -1, ArrowDown: -1, PageUp: 10, PageDown: -10 }[event.key];
+      if (!by) return;
+      event.preventDefault();
+      this.set(name, onStep(slider, this.wishes[name] + by * step));
+    });
+    this.inputs[name] = { input, show };
+    show(this.wishes[name]);
+    return element('label', {}, `${label.toLowerCase()} `, input, ' ', output);
+  }
+
+  #say(text, wrong = false) {
+    this.said.textContent = text;
+    this.said.classList.toggle('wrong', wrong);
+    this.again.hidden = !this.changed;
+  }
+
+  // -- what is wished -----------------------------------------------------------------------------------------------
+
+  set(name, value) {
+    this.wishes[name] = value;
+    this.inputs[name].input.value = String(value);
+    this.inputs[name].show(value);
+    return this.solve();
+  }
+
+  choose(i) {
+    this.start = this.about.starts[i];
+    this.wishes = this.#own();
+    this.#fill();
+    return this.solve();
+  }
+
+  back() {
+    this.#id++;   // what is on its way comes too late
+    this.start = this.about.starts[0];
+    this.wishes = this.#own();
+    this.#fill();
+    this.app.show(this.app.original);
+    this.#say('');
+  }
+
+  state() { return { wishes: { ...this.wishes }, start: this.about.starts.indexOf(this.start), changed: this.changed, said: this.said.textContent, ms: this.ms ?? null }; }
+
+  // Solve what is wished and show it. Returns whether it is shown: a newer wish, or a failure, keeps it from that.
+  async solve() {
+    if (!this.changed) {
+      this.back();
+      return true;
+    }
+    const began = performance.now(), id = ++this.#id, { start } = this, wishes = { ...this.wishes };
+    this.#say('solving …');
+    const answer = await this.#ask(start, wishes);
+    if (id !== this.#id || answer.dropped) return false;
+    if (answer.failed) {
+      this.#say(`No such landing: ${answer.failed}. Shown is the one before.`, true);
+      return false;
+    }
+    this.app.show(this.model(start, wishes, answer), 'what if');
+    this.ms = performance.now() - began;
+    this.#say(this.#words(start, wishes));
+    return true;
+  }
+
+  // A landing of the map that was not recorded: solved from its own start, if the page has it. Null where it has not.
+  async landing(cell) {
+    const start = (this.about.cells ?? {})[cell.open];
+    if (!start) return null;
+    const wishes = Object.fromEntries(start.sliders.map(slider => [slider.name, slider.value]));
+    const answer = await this.#ask(start, wishes);
+    return answer.failed || answer.dropped ? null : this.model(start, wishes, answer);
+  }
+
+  // -- the worker ---------------------------------------------------------------------------------------------------
+
+  #ask(start, wishes) {
+    this.#worker ??= this.#started();
+    const id = `${this.#waiting.size}-${performance.now()}`, { step, end } = this.about;
+    const words = this.app.original.get(BLOCKS), block = words.slice(start.first, start.first + start.given);
+    return new Promise(done => {
+      this.#waiting.set(id, done);
+      this.#worker.then(worker => worker.postMessage({ id, start, block, wishes, step, end: start.end ?? end, frame: FRAME }),
+        error => this.#answer({ id, failed: `the solver does not start: ${error.message}` }));
+    });
+  }
+
+  async #started() {
+    const source = document.getElementById('worker').textContent, wasm = await unpack(document.getElementById('wasm').textContent);
+    const worker = new Worker(URL.createObjectURL(new Blob([source], { type: 'text/javascript' })));
+    worker.onmessage = ({ data }) => this.#answer(data);
+    worker.onerror = event => {
+      this.app.page.errors.push(`worker: ${event.message}`);
+      for (const id of [...this.#waiting.keys()]) this.#answer({ id, failed: `the solver stopped: ${event.message}` });
+    };
+    worker.postMessage({ wasm }, [wasm]);
+    return worker;
+  }
+
+  #answer(answer) {
+    this.#waiting.get(answer.id)?.(answer);
+    this.#waiting.delete(answer.id);
+  }
+
+  // -- what is shown ------------------------------------------------------------------------------------------------
+
+  // The answer as the page shows landings; verdict and limits are its own.
+  model(start, wishes, { time, signals, tension, line }) {
+    const { original } = this.app, arrays = { time, ...signals, [TENSION_ALONG]: tension };
+    for (const [name, values] of Object.entries(line)) arrays[`line.${name}`] = values;
+    for (const name of Object.keys(original.arrays)) {   // inputs over time are as they were
+      if (INPUTS.test(name)) arrays[name] = Float64Array.from(time, t => original.at(name, t));
+    }
+    const scene = start.scene ?? {}, head = { ...original.head, ...scene, line: { prefix: '', exact: true }, reference: null, runs: [], whatif: this.about };
+    const said = judge(limitsFor(start, wishes.mass), new Model(head, arrays)), [word, name] = VERDICTS[said.safe];
+    const verdict = { word: `What if: ${word.toLowerCase()}`, class: name };
+    return new Model({ ...head, verdict, safety: this.#covers(said), limits: said.limits, not_judged: said.not_judged }, arrays);
+  }
+
+  #covers({ safety, not_judged: missing }) {
+    const left = Object.keys(missing);
+    return `${safety}${left.length ? `; not judged: ${left.join(', ')}` : ''}. A what-if: its error is not estimated.`;
+  }
+
+  // What was solved, by what, and how the command line gives the same.
+  #words(start, wishes) {
+    const { solver, tolerance, scenario } = this.about, first = this.about.starts[0];
+    const settings = start.sliders.filter(({ name, value }) => wishes[name] !== value).map(({ name, key }) => `--set ${key}=${+wishes[name].toPrecision(12)}`);
+    if (wishes.mass !== start.sliders[0].value) settings.push(...Object.entries(start.held).map(([key, value]) => `--set ${key}=${+value.toPrecision(15)}`));
+    if (start.position !== first.position) settings.unshift(`--set landing.position=${start.position}`);
+    if (start.robot !== first.robot) settings.unshift(`--robot ${start.robot}`);
+    return `A what-if, not the run: the ${solver} solver, local tolerance ${tolerance.toExponential().replace('e-', 'e−')} m, in this page in ${fixed(this.ms / 1000, 2)} s; ` +
+      `no estimate of its error. As ${scenario} with ${settings.join(' ')}.`;
+  }
+}
+
+const named = (start, first) => (start.robot !== first.robot ? `${start.robot} at ${+start.position.toFixed(3)} m` : `at ${+start.position.toFixed(3)} m`);
+
+// The nearest value on the slider's steps, counted from that of the run.
+function onStep({ value, step, least, most }, wanted) {
+  const found = value + Math.round((wanted - value) / step) * step;
+  return Math.min(Math.max(+found.toPrecision(12), least), most);
+}
