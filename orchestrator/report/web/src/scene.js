@@ -28,8 +28,9 @@ export class View {
   #stale = true;   // what depends on the scales alone has to be drawn anew
 
   constructor(canvas, invalidate) {
-    if (!document.createElement('canvas').getContext('webgl2')) throw new Error('no WebGL 2');
-    this.renderer = new WebGLRenderer({ canvas, antialias: true, alpha: true });
+    const context = canvas.getContext('webgl2', { antialias: true, alpha: true });   // three would say so on the console
+    if (!context) throw new Error('no WebGL 2');
+    this.renderer = new WebGLRenderer({ canvas, context });
     this.renderer.debug.checkShaderErrors = false;   // asking for errors would wait for the compiler, shader by shader
     this.scene = new Scene();
     this.camera = new PerspectiveCamera(FIELD, 1, 0.02, 4000);
@@ -77,6 +78,7 @@ export class View {
     this.#reference(model);
     this.theme();
     if (first || moved) this.view(this.name); else this.#stale = true;
+    if (first) this.renderer.compile(this.scene, this.camera);   // shaders are made while the rest of the page is
   }
 
   #replace(key, made) {
