@@ -12,7 +12,6 @@ from itertools import pairwise
 from pathlib import Path
 from typing import Any
 
-import numba
 import numpy as np
 import pytest
 
@@ -40,7 +39,13 @@ ROUND_OFF = 1e-13
 """Relative; parameters found from others, by one way of reckoning or another."""
 SHARE = 0.01
 """Of the solver's own estimated error, by which kernels for two kinds of processor may differ."""
-GENERIC = numba.config.CPU_NAME == "generic"  # type: ignore[attr-defined]
+STILL = 1e-9
+"""SI; what stays within it is zero by symmetry, and holds round-off alone."""
+SAME_CODE = {
+    name: value for name, value in wasm.GENERIC.items() if name.startswith(("NUMBA_CPU", "NUMBA_LOOP", "NUMBA_SLP"))
+}
+"""Settings with which Numba makes for this machine what it makes for WebAssembly: no vectors, no fused multiplication."""
+GENERIC = all(os.environ.get(name) == value for name, value in SAME_CODE.items())
 
 
 def system_of(name: str = FLAGSHIP, *values: str, robot: str | None = None, stop: float = 1.0) -> LandingSystem:
@@ -290,7 +295,7 @@ def test_why_there_is_none_is_said(tmp_path: Path):
     times = np.linspace(0.0, 1.0, 700).tolist()
     course = f"robot.inputs.thrust={{ time = {times}, value = {times}, interpolation = 'linear' }}"
     about = left(tmp_path / "run", system_of(FLAGSHIP, course))
-    assert "700 kinks" in about["reason"] or "698 kinks" in about["reason"]
+    assert about["reason"] == "inputs over time with 699 kinks, more than 500"
     assert about["starts"] == [] and not (tmp_path / "run" / "start.bin").exists()
 
 
@@ -340,7 +345,6 @@ LANDINGS = [
 ]
 
 
-@pytest.mark.portable
 @pytest.mark.parametrize(("name", "robot", "values"), LANDINGS)
 def test_webassembly_solves_as_python_does(module: Path, name: str, robot: str | None, values: tuple[str, ...]):
     """To the bit with kernels for a generic processor. Else they round otherwise, and Newton's method may end otherwise:
@@ -355,11 +359,22 @@ def test_webassembly_solves_as_python_does(module: Path, name: str, robot: str |
     compiled = Compiled(module)
     assert compiled.load(block) == 0.0
     found, wanted = compiled.solve(times, signals(block, one)), exact(landing, times, estimate=not GENERIC)
-    for signal in found.keys() & wanted.signals.keys():
+    discrete = set() if GENERIC else {name for name in found if name.endswith(".status")}
+    for signal in found.keys() & wanted.signals.keys() - discrete:
         apart = float(np.max(np.abs(found[signal] - wanted.signals[signal])))
-        floor = 1e-13 * float(np.max(np.abs(wanted.signals[signal])))
-        allowed = 0.0 if GENERIC else max(SHARE * wanted.estimated_error[signal], floor, 1e-12)
+        still = np.ptp(wanted.signals[signal]) <= STILL
+        allowed = 0.0 if GENERIC else STILL if still else SHARE * wanted.estimated_error[signal]
         assert apart <= allowed, signal
+
+
+@pytest.mark.slow
+def test_webassembly_is_native_code_to_the_bit(module: Path, tmp_path: Path):
+    """Where kernels are made for a processor that rounds as WebAssembly does; in a process of its own, which compiles them."""
+    assert module.is_file()
+    environment = {**os.environ, **SAME_CODE, "LINE_LANDING_CACHE": str(tmp_path)}
+    call = [sys.executable, "-m", "pytest", "-q", __file__, "-k", "webassembly_solves"]
+    found = subprocess.run(call, env=environment, cwd=ROOT, capture_output=True, text=True, check=False)
+    assert found.returncode == 0 and "4 passed" in found.stdout, found.stdout[-3000:]
 
 
 @pytest.mark.parametrize(("name", "robot", "wishes"), WISHES)
@@ -444,7 +459,8 @@ def test_a_limit_goes_with_the_mass(tmp_path: Path):
     start, masses = start_for(landing), (38.0, 60.0, 90.0)
     requests = [{"table": table, "start": start, "mass": mass} for mass in masses]
     for mass, found in zip(masses, in_node("judge.mjs", requests, tmp_path), strict=True):
-        assert_same(found, judge(system_of(FLAGSHIP, f"robot.parameters.mass={mass}").limits, table))
+        _, heavier = wished(FLAGSHIP, None, {"mass": ("robot.parameters.mass", mass)})
+        assert_same(found, judge(heavier.limits, table))
 
 
 def test_what_is_not_recorded_is_never_safe_in_silence(tmp_path: Path):
