@@ -33,7 +33,7 @@ if TYPE_CHECKING:
 FORMAT = 1
 TOLERANCE = 1e-6
 """m; local error of the robot's position a step: leaves 3e-7 of the flagship's range (docs/concepts/whatif.md)."""
-SHORTEST, LONGEST = 0.005, 0.02
+SHORTEST, LONGEST = 0.01, 0.02
 """s; between these the signals are shown: at the macro step, or a multiple or part of it."""
 A_START = 250
 """Macro steps of a run for which one more start is solved: one costs 40 ms, such steps with their estimate 0.7 s."""
@@ -161,7 +161,7 @@ def _start(system: LandingSystem) -> tuple[np.ndarray, dict[str, Any]]:
         "signals": signals(block, integrator),
         "sliders": [asdict(slider) for slider in _sliders(system, block)],
         "held": _held(system),
-        "limits": _limits(system.limits),
+        "limits": limits_content(system.limits),
         "pitch": pitch_by_mass(system.landing),
         "geometry": geometry(system.landing),
     }
@@ -174,7 +174,8 @@ def _held(system: LandingSystem) -> dict[str, float]:
     return {f"cable.parameters.{load}": float(settings[load])} if load in settings else {}
 
 
-def _limits(limits: Limits) -> dict[str, Any]:
+def limits_content(limits: Limits) -> dict[str, Any]:
+    """Return the limits as the page's judge takes them."""
     known = {
         name: {
             "limit": limit.value,

@@ -41,9 +41,13 @@ def packed(integrator: Integrator, inertia_stays: bool = False) -> Block:
     integrator : newly made, begun or not
     inertia_stays : whether another mass leaves the inertia as it is
     """
-    one = integrator
-    start = Start(_wishes(one), _options(one, inertia_stays), _segments(one.loads))
+    one, start = integrator, start_of(integrator, inertia_stays)
     return pack(Parts(one.system, one.state, one.control, start, shown_of(one.problem), one.space, one.work))
+
+
+def start_of(one: Integrator, inertia_stays: bool = False) -> Start:
+    """Return what a solution starts from beside system and state; parameters as for `packed`."""
+    return Start(_wishes(one), _options(one, inertia_stays), _segments(one.loads))
 
 
 def _wishes(one: Integrator) -> np.ndarray:

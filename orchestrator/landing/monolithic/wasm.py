@@ -2,12 +2,13 @@
 
 Numba lowers the entry kernels to LLVM's language for a processor without vector units and without optimising, since code
 optimised for one machine holds what only that machine has. llvmlite makes it anew for wasm32, optimises it, and LLVM's
-linker ``wasm-ld`` makes the module. Numba's settings are those of a process, hence one of its own.
+linker ``wasm-ld`` makes the module. Numba's settings are those of a process, hence one of its own. It takes a minute.
 """
 
 from __future__ import annotations
 
 import argparse
+import hashlib
 import json
 import os
 import re
@@ -20,6 +21,8 @@ from importlib.metadata import version
 from importlib.util import find_spec
 from pathlib import Path
 from typing import Any
+
+from fmus.kernels import notice
 
 MODULE, ABOUT = "landing.wasm", "landing.json"
 GENERIC = {
@@ -91,10 +94,8 @@ def made_from() -> dict[str, str]:
     from orchestrator.landing.monolithic.block import kernels_hash
 
     versions = {name: version(name) for name in ("numba", "llvmlite", "numpy")}
-    recipe = Path(__file__).read_bytes()
-    import hashlib
-
-    return {"kernels": kernels_hash(), "recipe": hashlib.sha256(recipe).hexdigest()[:16], **versions}
+    recipe = hashlib.sha256(Path(__file__).read_bytes()).hexdigest()[:16]
+    return {"kernels": kernels_hash(), "recipe": recipe, **versions}
 
 
 def _placed(content: bytes, path: Path) -> None:
@@ -153,15 +154,9 @@ def lower(place: str) -> None:
     """Write the object file of the entry kernels for WebAssembly, and its description, to `place`."""
     import llvmlite.binding as llvm
 
+    notice.muted = True
     llvm.initialize_all_targets()
     llvm.initialize_all_asmprinters()
-    import time
-
-    t0 = time.time()
-
-    def say(x):
-        print(x, round(time.time() - t0, 1), flush=True)
-
     whole = llvm.parse_assembly(f'target datalayout = "{LAYOUT}"\ntarget triple = "{TRIPLE}"\n{RESHAPE}')
     for name, (inner, code) in _lowered().items():
         extra = ENTRIES[name]
@@ -171,10 +166,7 @@ def lower(place: str) -> None:
             parameters="".join(f", double %{p}" for p in extra),
             arguments="".join(f", double %{p}" for p in extra),
         )
-        say(name + " lowered %d" % len(text))
-        open("/tmp/ll_" + name + ".ll", "w").write(text)
         whole.link_in(llvm.parse_assembly(text))
-        say("linked")
     whole.verify()
     for function in whole.functions:
         if not function.is_declaration:
@@ -183,10 +175,7 @@ def lower(place: str) -> None:
     tuning = llvm.create_pipeline_tuning_options(speed_level=3)
     tuning.loop_vectorization = tuning.slp_vectorization = False
     passes = llvm.create_pass_builder(machine, tuning)
-    say("optimise")
-    open("/tmp/ll_whole.ll", "w").write(str(whole))
     passes.getModulePassManager().run(whole, passes)
-    say("optimised")
     Path(place, "landing.o").write_bytes(machine.emit_object(whole))
     imports = sorted(f.name for f in whole.functions if f.is_declaration and not f.name.startswith("llvm."))
     about = {**made_from(), "exports": [*ENTRIES, "memory", "__heap_base"], "imports": imports}
