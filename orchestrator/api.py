@@ -38,6 +38,7 @@ from orchestrator.runs.files import (
 from orchestrator.runs.result import Run, Signal, run_label
 from orchestrator.runs.summary import result
 from orchestrator.runs.systems import System, resolve
+from orchestrator.runs.whatif import leave
 from orchestrator.scenario.layers import shared_options
 from orchestrator.scenario.read import load
 from orchestrator.scenario.settings import Set, texts
@@ -117,8 +118,12 @@ def run(
     with read_once():
         loaded = Changes(set, robot, master, macro_step, stop, timeout, estimate).of(scenario)
         with _directory(out, loaded.name) as directory:
-            found = _run(_ready(loaded), progress or _silent)
-            return found if directory is None else write_run(directory, found, _views(pictures))
+            system = _ready(loaded)
+            found = _run(system, progress or _silent)
+            if directory is None:
+                return found
+            leave(directory, system, others=pictures)
+            return write_run(directory, found, _views(pictures))
 
 
 def compare(
@@ -160,8 +165,12 @@ def compare(
         variants = _variants(scenario, first, changes, masters, macro_steps)
         with _directory(out, f"{first.name}-compare") as directory:
             views = _views(pictures)
-            found = _compared(_ready(first), variants, progress or _silent, directory, views)
-            return found if directory is None else write_comparison(directory, found, views)
+            system = _ready(first)
+            found = _compared(system, variants, progress or _silent, directory, views)
+            if directory is None:
+                return found
+            leave(directory, system, others=pictures)
+            return write_comparison(directory, found, views)
 
 
 def sweep(

@@ -4,11 +4,15 @@ from __future__ import annotations
 
 from collections.abc import Sequence
 from dataclasses import replace
+from itertools import product
+from pathlib import Path
 from typing import Any
 
 import numpy as np
+from scipy.spatial.transform import Rotation
 
 from orchestrator.coupling.run.compare import signal_errors
+from orchestrator.coupling.run.results import write_json, write_table
 from orchestrator.landing.safety import Limit, Limits, judge
 from orchestrator.runs.compare import Comparison, Reference, RunErrors
 from orchestrator.runs.result import Run
@@ -52,14 +56,16 @@ def made_up(table: dict[str, np.ndarray], master: str = "iqn_ils", macro_step: f
 # -- with all that a page shows -----------------------------------------------------------------------------------
 
 
+LIMITS = Limits(
+    {"roll": Limit("roll", 0.25, "rad", "eq. 1"), "tension": Limit("tension", 0.4, "1", "a code", reference=98e3)},
+    {"slip": "no limit given"},
+)
+
+
 def on_a_line(n_wheels: int = 1, shift: float = 0.0) -> Run:
     """A landing that is drawn: with wheels, ports, a line, limits, geometry, sources and estimated errors."""
     table = landing(n_wheels, shift) | _places(n_wheels, shift)
-    limits = Limits(
-        {"roll": Limit("roll", 0.25, "rad", "eq. 1"), "tension": Limit("tension", 0.4, "1", "a code", reference=98e3)},
-        {"slip": "no limit given"},
-    )
-    said = judge(limits, table).content()
+    said = judge(LIMITS, table).content()
     parts = {"coupling": 1e-8, "inner_steps": None, "mesh": 2e-5, "total": 3e-5}
     units = {name: "m" if "position" in name else "N" for name in table}
     run = made_up(
@@ -102,18 +108,89 @@ def _along(k: int, n_wheels: int) -> float:
 
 
 def _places(n_wheels: int, shift: float) -> dict[str, np.ndarray]:
-    """The signals of places and forces that are drawn."""
-    zero, up = np.zeros(TIME.size), 3.2152 + Z + shift
+    """The signals of places and forces that are drawn; wheels are where the robot's angles put them."""
+    zero = np.zeros(TIME.size)
+    angles = np.stack([k * 0.01 * np.sin(TIME) for k in (2, 1, 0)], axis=1)  # yaw, pitch, roll of `landing`
+    turned = Rotation.from_euler("ZYX", angles)
+    body = np.stack([zero, 20.0 + zero, 3.0 + Z + shift], axis=1)
     table = {"robot.body.position.x": zero, "cable.tension_left": 23000.0 + zero, "cable.tension_right": 22500.0 + zero}
     for k in range(1, n_wheels + 1):
-        y = 20.0 + _along(k - 1, n_wheels)
-        for name, place in {f"robot.wheel[{k}].position": up, f"cable.port[{k}].position": up - 0.053}.items():
-            table |= {f"{name}.x": zero, f"{name}.y": y + zero, f"{name}.z": place}
-        vectors = {f"robot.wheel[{k}].axle": "x", f"cable.port[{k}].tangent": "y", f"contact{k}.wheel.force": "z"}
-        table |= {f"{name}.{c}": (1.0 if c == one else 0.0) + zero for name, one in vectors.items() for c in "xyz"}
+        centre = body + turned.apply([0.0, _along(k - 1, n_wheels), 0.2152])
+        vectors = {
+            f"robot.wheel[{k}].position": centre, f"cable.port[{k}].position": centre - [0.0, 0.0, 0.0532],
+            f"robot.wheel[{k}].axle": turned.apply([1.0, 0.0, 0.0]),
+            f"cable.port[{k}].tangent": np.tile([0.0, 1.0, 0.0], (TIME.size, 1)),
+            f"contact{k}.wheel.force": np.tile([0.0, 0.0, 400.0], (TIME.size, 1)),
+        }  # fmt: skip
+        table |= {f"{name}.{axis}": values[:, i] for name, values in vectors.items() for i, axis in enumerate("xyz")}
         table |= {f"contact{k}.{name}": 0.01 + zero for name in ("slip_velocity", "penetration", "friction_force")}
-        table |= {f"contact{k}.cable.s": y + zero}
+        table |= {f"contact{k}.cable.s": centre[:, 1]}
     return table
+
+
+def swept(folder: Path) -> Path:
+    """The folder of a made-up sweep of two places and two masses; the third run has left no signals, the last is unsafe."""
+    cells, rows = [], []
+    for i, (place, mass) in enumerate(product((20.0, 60.0), (38.0, 80.0)), start=1):
+        run = on_a_line()
+        table = run.table | {"robot.body.position.y": place + 0.0 * TIME}
+        table |= {"robot.roll": (0.3 if i == 4 else 0.1) * np.sin(TIME)}
+        said = judge(LIMITS, table).content()
+        write_json(
+            folder / "runs" / f"run{i}" / "summary.json",
+            {**said, "geometry": geometry(1) | {"landing_position": place}},
+        )
+        if i != 3:
+            write_table(folder / "runs" / f"run{i}" / "results.csv", table)
+        margins = {name: 1.0 - one["share"] for name, one in said["limits"].items()}
+        binding = min(margins, key=lambda name: margins[name])
+        verdict = "safe" if said["safe"] else "unsafe"
+        cells.append({
+            "at": [place, mass], "areas": [[[place - 20.0, place + 20.0], [mass - 21.0, mass + 21.0]]],
+            "margin": margins[binding], "binding": binding, "verdict": verdict, "margins": margins, "probability": None,
+            "run": i, "folder": f"runs/run{i}", "recorded": i != 3, "runs": [i], "failed": 0,
+        })  # fmt: skip
+        rows.append(f"{i},{place},{mass},{int(said['safe'])},{margins[binding]},{binding},{said['safety']},")
+    axes = [
+        _axis("landing.position", "Landing position", "m", [20.0, 60.0]),
+        _axis("robot.parameters.mass", "Mass of the robot", "kg", [38.0, 80.0]),
+    ]
+    limits = ["roll", "tension"]
+    content = {
+        "format": 1,
+        "study": "made_up",
+        "title": "A sweep",
+        "complete": True,
+        "refined": None,
+        "axes": axes,
+        "limits": limits,
+    }
+    write_json(folder / "map.json", content | {"maps": [{"where": {}, "cells": cells}]})
+    counts = {"runs": 4, "safe": 3, "not_safe": 1, "not_judged": 0, "failed": 0}
+    study = {
+        "study": "made_up",
+        "title": "A sweep",
+        "complete": True,
+        "counts": counts,
+        "content": {"scenario": "made_up"},
+    }
+    write_json(folder / "study.json", study)
+    head = "run,landing.position,robot.parameters.mass,safe,least_margin,binding,verdict,failure"
+    (folder / "table.csv").write_text(
+        "\n".join([head, *(row.replace(": roll, tension", ": roll and tension") for row in rows)]) + "\n"
+    )
+    return folder
+
+
+def _axis(key: str, label: str, unit: str, values: list[float]) -> dict[str, Any]:
+    return {
+        "key": key,
+        "label": label,
+        "unit": unit,
+        "numeric": True,
+        "values": values,
+        "range": [values[0], values[-1]],
+    }
 
 
 def compared_to(run: Run, masters: Sequence[str]) -> Comparison:

@@ -18,10 +18,11 @@ from orchestrator.landing import workspace
 from orchestrator.report.page import line, write
 from orchestrator.report.page.blob import Place, pack, unpack
 from orchestrator.report.page.data import Source, pack_within
+from orchestrator.report.page.gap import gap_of
 from orchestrator.runs.directory import RunDirectory
 from orchestrator.runs.files import write_comparison, write_run
 from orchestrator.runs.result import Run
-from tests.made_up import TIME, compared_to, landing, made_up, on_a_line
+from tests.made_up import TIME, compared_to, geometry, landing, made_up, on_a_line
 
 TEMPLATE = """<!doctype html><html lang="en"><head><meta http-equiv="Content-Security-Policy" content="@@CSP@@">
 <title>@@TITLE@@</title><style>@@STYLE@@</style></head><body>@@BODY@@<pre>@@LICENCES@@</pre>
@@ -205,10 +206,31 @@ def test_scene_of_the_robot_is_that_of_the_summary(tmp_path: Path, web: Path):
     assert (robot["along"], robot["layout"], robot["thrust"]) == (1.25, "top", False)
 
 
-def test_the_gap_closes_where_the_roll_limit_of_the_paper_is():
+@pytest.mark.parametrize("pitch", [0.0, 0.1])
+def test_the_gap_closes_where_the_roll_limit_of_the_paper_is(pitch: float):
+    """Over a straight line in the groove the gap at the rim is that of plane geometry: L_c - D/2 tan(roll)."""
     most = workspace.roll(0.162, 1.25).value
-    gap = workspace.clearance(0.162, 1.25, np.array([0.0, most, -most, 1.1 * most]))
-    assert gap[0] == 0.162 and gap[1:3] == pytest.approx([0.0, 0.0], abs=1e-15) and gap[3] < 0.0
+    rolls = np.array([0.0, 0.5 * most, most, -most])
+    time, zero, s = np.arange(4.0), np.zeros(4), np.array([0.0, 50.0, 200.0])
+    position = np.broadcast_to(np.stack([0.0 * s, s, 0.0 * s], axis=1), (4, 3, 3))
+    straight = line.Line(s, time, position, np.broadcast_to([0.0, 1.0, 0.0], (4, 3, 3)), True)
+    table = {
+        "time": time,
+        "contact1.cable.s": 20.0 + zero,
+        "robot.roll": rolls,
+        "robot.pitch": pitch + zero,
+        "robot.yaw": zero,
+    }
+    arm = 0.162 * np.array(
+        [-np.sin(pitch) * np.cos(rolls), np.sin(rolls), -np.cos(pitch) * np.cos(rolls)]
+    )  # of b from the line
+    table |= {f"robot.body.position.{c}": 20.0 * (c == "y") + place for c, place in zip("xyz", arm, strict=True)}
+    found = gap_of(geometry(1), table, straight)
+    assert found is not None
+    if pitch == 0.0:
+        assert found.size == pytest.approx(0.162 - 0.625 * np.tan(np.abs(rolls)), abs=1e-12) and found.size[2] < 1e-12
+    else:
+        assert found.size[0] == pytest.approx(0.162, rel=1e-12)
 
 
 def test_a_comparison_holds_the_reference_and_the_other_runs(tmp_path: Path, web: Path):

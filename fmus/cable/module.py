@@ -372,4 +372,8 @@ class Cable:
 
     def _show_nodes(self) -> None:
         """Write position and slope of the nodes that are shown."""
-        self._nodes_shown[:] = self.state[: self.model.weight.size].reshape(-1, 6)[self._nodes_at]
+        self._nodes_shown[:] = self.nodes_at(self.state)
+
+    def nodes_at(self, state: np.ndarray) -> np.ndarray:
+        """Return position and slope of the nodes that are shown, (N_NODES, 6), in a `state` of the kernels."""
+        return state[: self.model.weight.size].reshape(-1, 6)[self._nodes_at]

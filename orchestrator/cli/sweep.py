@@ -43,6 +43,10 @@ def sweep(
     print(f"table in {folder / write.TABLE}")
     for path in maps.write(folder, read, found.outcomes):
         print(f"map in {path}")
+    if (missing := write.page(folder)) is not None:
+        printing.complain(missing)
+    else:
+        print(f"page in {folder / 'report.html'}")
     raise typer.Exit(MISSED if found.failed else DONE)
 
 

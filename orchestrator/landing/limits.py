@@ -110,6 +110,26 @@ def _pitch(landing: Landing) -> tuple[Formula, str]:
     return workspace.pitch(mass, gravity, spec.rotors.max_thrust.value), "F_z,max of the robot's rotors"
 
 
+def pitch_by_mass(landing: Landing) -> dict[str, float] | None:
+    """Return what the limit of pitch follows from beside the mass: gravity (m/s²) and largest thrust (N).
+
+    None where it does not: it is given, or nothing gives it.
+    """
+    spec = landing.sources.spec
+    if (
+        landing.scenario.limits.pitch is not None
+        or spec is None
+        or spec.limits.pitch is not None
+        or spec.rotors is None
+    ):
+        return None
+    try:
+        _require_hanging(landing, "pitch")
+    except NoRoom:
+        return None
+    return {"gravity": _robot_values(landing, "gravity")[0], "thrust": spec.rotors.max_thrust.value}
+
+
 def _z(landing: Landing) -> tuple[Formula, str]:
     limits = landing.scenario.limits
     if limits.conductor_spacing is None or limits.safe_clearance is None:

@@ -47,16 +47,6 @@ def roll(arm: float, width: float) -> Formula:
     return Formula("eq. 1", "arctan(2 L_c / D_Ry)", filled, math.atan2(2.0 * arm, width), "rad")
 
 
-def clearance(arm: float, width: float, roll: np.ndarray) -> np.ndarray:
-    """Return the gap (n,) m of line and rim of the rotor plane at `roll` (n,) rad against the line; 0 at the limit of eq. 1.
-
-    Parameters
-    ----------
-    arm, width : as for `roll`
-    """
-    return abs(arm) * np.cos(roll) - 0.5 * width * np.abs(np.sin(roll))
-
-
 def yaw(groove_width: float, cable_diameter: float, wheel_diameter: float) -> Formula:
     """Return at which yaw against the line (rad) the cable may leave the groove: eq. 3, eq. 2 on the safe side."""
     free = groove_width - 2.0 * cable_diameter

@@ -19,6 +19,9 @@ from orchestrator.coupling.run.results import write_fields, write_json, write_ta
 
 PACKAGES = ("line-landing", "numpy", "scipy", "numba", "fmpy", "pythonfmu")
 
+START_BLOCKS, START = "start.bin", "start.json"
+"""What a landing leaves to be solved anew, and what is said of it (`orchestrator/runs/whatif.py`)."""
+
 
 class Taken(InputError):
     """The directory is there already."""

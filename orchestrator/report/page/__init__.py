@@ -2,7 +2,7 @@
 
 from __future__ import annotations
 
-from collections.abc import Iterator, Mapping
+from collections.abc import Callable, Iterator, Mapping
 from pathlib import Path
 from typing import Any
 
@@ -11,6 +11,7 @@ from orchestrator.coupling.run.results import read_json, replacing
 from orchestrator.report.drawing import pictures, results_in, run_folders
 from orchestrator.report.page import template
 from orchestrator.report.page.content import Content, of_results
+from orchestrator.report.page.sweep import is_sweep, of_sweep
 from orchestrator.report.page.template import DIST, is_built
 from orchestrator.runs.files import require_finished
 
@@ -22,7 +23,7 @@ OWN = 1_250_000
 
 
 def report(directory: Path, web: Path = DIST) -> Path:
-    """Draw the pictures of a finished run or comparison anew, and return the page.
+    """Draw the pictures of a finished run or comparison anew, and return the page; of a sweep, the page alone.
 
     Parameters
     ----------
@@ -32,10 +33,21 @@ def report(directory: Path, web: Path = DIST) -> Path:
     ------
     InputError : there are no results, or they are damaged
     """
+    if is_sweep(directory):
+        return _guarded(directory, lambda: write_sweep(directory, web))
     require_finished(directory)
+    return _guarded(directory, lambda: _drawn_anew(directory, web))
+
+
+def _drawn_anew(directory: Path, web: Path) -> Path:
+    list(pictures(directory, results_in(directory)))
+    return write(directory, read_json(directory / "manifest.json"), web)
+
+
+def _guarded(directory: Path, make: Callable[[], Path]) -> Path:
+    """Return what `make` has made; `InputError` where the directory is damaged."""
     try:
-        list(pictures(directory, results_in(directory)))
-        return write(directory, read_json(directory / "manifest.json"), web)
+        return make()
     except Exception as error:  # whatever is in a damaged folder: a file of another kind, half a table, a missing key
         if isinstance(error, OrchestratorError) or (isinstance(error, OSError) and error.errno):
             raise  # said already; or the system's word, a full disk for instance
@@ -43,26 +55,28 @@ def report(directory: Path, web: Path = DIST) -> Path:
 
 
 def write(directory: Path, manifest: Mapping[str, Any], web: Path = DIST) -> Path:
-    """Write the page of a directory from what stands there and its `manifest`, and return its path."""
-    content = of_results(results_in(directory), manifest, MOST - OWN)
-    text = _interactive(content, web) if is_built(web) else _plain(content, directory)
+    """Write the page of a run or a comparison from what stands in its directory and its `manifest`, and return its path."""
+    return _written(of_results(results_in(directory), manifest, web, MOST - OWN), directory, web)
+
+
+def write_sweep(directory: Path, web: Path = DIST) -> Path:
+    """Write the page of a sweep, finished or not, from what stands in its directory, and return its path."""
+    return _written(of_sweep(directory, web, MOST - OWN), directory, web)
+
+
+def _written(content: Content, directory: Path, web: Path) -> Path:
+    head, body = content.head, content.body
+    if is_built(web):
+        text = template.filled(web, head.title, body, head.content(), content.data.blob.text, content.module)
+    else:
+        text = template.plain(head.title, body, _drawn(directory))
     with replacing(directory / NAME) as temporary:
         temporary.write_text(text, encoding="utf-8")
     return directory / NAME
 
 
-def _interactive(content: Content, web: Path) -> str:
-    head = content.head
-    return template.filled(web, head.title, content.body, head.content(), content.data.blob.text)
-
-
-def _plain(content: Content, directory: Path) -> str:
-    return template.plain(content.head.title, content.body, _drawn(directory))
-
-
 def _drawn(directory: Path) -> Iterator[tuple[str, Path]]:
     """Yield the pictures that were drawn, with names that say of what."""
-    folders = dict.fromkeys([*run_folders(directory), directory])
-    for folder in folders:
-        for path in sorted(folder.glob("plots/*.png")):
+    for folder in dict.fromkeys([*run_folders(directory), directory]):
+        for path in sorted([*folder.glob("plots/*.png"), *folder.glob("map.png")]):
             yield path.relative_to(directory).with_suffix("").as_posix(), path

@@ -4,18 +4,21 @@ from __future__ import annotations
 
 from collections.abc import Iterable, Iterator, Mapping, Sequence
 from dataclasses import dataclass, replace
+from pathlib import Path
 from typing import Any
 
-from orchestrator.coupling.run.results import Table
 from orchestrator.report.drawing import legend
 from orchestrator.report.page import tables
 from orchestrator.report.page.curves import hud_of, plots_of
 from orchestrator.report.page.data import Packed, Source, pack_within
+from orchestrator.report.page.gap import Gap, gap_of
 from orchestrator.report.page.head import Head, Kind, LinePlace, Plot, Shown, Verdict
 from orchestrator.report.page.html import Html, card, table, tag
-from orchestrator.report.page.scene import clearance, robot_of, span_of
+from orchestrator.report.page.line import line_of
+from orchestrator.report.page.scene import place_of
 from orchestrator.report.page.template import Body
 from orchestrator.report.page.tiles import header, tiles, verdict_of
+from orchestrator.report.page.whatif import WhatIf, whatif_of
 from orchestrator.runs.compare import Comparison
 from orchestrator.runs.result import Run, verdict_word
 
@@ -26,37 +29,48 @@ Manifest = Mapping[str, Any]
 
 @dataclass(frozen=True)
 class Content:
-    """Head, arrays and body of a page."""
+    """Head, arrays and body of a page, and the WebAssembly of its what-if."""
 
     head: Head
     data: Packed
     body: Body
+    module: str = ""
 
 
-def of_results(results: Comparison | list[Run], manifest: Manifest, most: int) -> Content:
-    """Return the content of a page from what was read from its directory; its arrays take at most `most` characters."""
+def of_results(results: Comparison | list[Run], manifest: Manifest, web: Path, most: int) -> Content:
+    """Return the content of a page from what was read from its directory.
+
+    Parameters
+    ----------
+    web : folder of what was built of the page
+    most : characters that its arrays may take
+    """
+    first, *others = results.results if isinstance(results, Comparison) else results
+    whatif = whatif_of(first.directory, web) if first.directory is not None else WhatIf()
     if isinstance(results, Comparison):
-        return _of_comparison(results, manifest, most)
-    first, *others = results
-    return _of_runs(first, others, manifest, most)
+        found = _of_comparison(results, manifest, whatif, most)
+    else:
+        found = _of_runs(first, others, manifest, whatif, most)
+    return replace(found, head=replace(found.head, whatif=whatif.about), module=whatif.module)
 
 
-def _of_runs(first: Run, others: Sequence[Run], manifest: Manifest, most: int) -> Content:
+def _of_runs(first: Run, others: Sequence[Run], manifest: Manifest, whatif: WhatIf, most: int) -> Content:
     plots = _plots(first)
-    data = pack_within([_source(first, plots), *(_source(run, plots, f"{run.label}/") for run in others)], most)
+    sources = [_source(first, plots), *(_source(run, plots, f"{run.label}/") for run in others)]
+    data = pack_within(sources, most, whatif.arrays)
     head = _head(_kind(first), first, manifest, data, plots)
     shown = [_shown(first, ""), *(_shown(run, f"{run.label}/") for run in others)] if others else []
     lower = [_runs_card([first, *others]) if others else Html(), *_lower(first, manifest), *_of_each(others)]
     return Content(replace(head, runs=shown), data, Body(_top(first, manifest, data), _more(lower)))
 
 
-def _of_comparison(found: Comparison, manifest: Manifest, most: int) -> Content:
+def _of_comparison(found: Comparison, manifest: Manifest, whatif: WhatIf, most: int) -> Content:
     first, *others = found.results
     reference, plots = found.reference, _plots(first)
     names = _names(plots)
     sources = [_source(first, plots), Source(REFERENCE, reference.table, reference.fields, names)]
     sources += [_source(run, plots, f"{run.label}/") for run in others]
-    data = pack_within(sources, most)
+    data = pack_within(sources, most, whatif.arrays)
     head = _head("comparison" if _kind(first) == "run" else "graph", first, manifest, data, plots)
     head = replace(
         head, runs=[_shown(first, ""), *(_shown(run, f"{run.label}/") for run in others)], reference=reference.kind
@@ -91,7 +105,6 @@ def _shown(run: Run, prefix: str) -> Shown:
 
 def _head(kind: Kind, run: Run, manifest: Manifest, data: Packed, plots: list[Plot]) -> Head:
     geometry = run.summary.get("geometry")
-    gap = clearance(geometry, run.table) is not None
     head = Head(
         kind=kind,
         title=manifest["resolved"]["title"],
@@ -99,22 +112,18 @@ def _head(kind: Kind, run: Run, manifest: Manifest, data: Packed, plots: list[Pl
         error=manifest["error"],
         arrays=data.blob.places,
         verdict=verdict_of(run.summary),
+        safety=run.safety,
         line=_line(run),
         plots=plots,
-        hud=hud_of(run.table, gap) if kind != "graph" else [],
+        hud=hud_of(run.table, with_clearance=_gap(run) is not None) if kind != "graph" else [],
         limits=run.summary.get("limits", {}),
         thinned=data.note,
     )
-    return head if geometry is None else replace(head, **_place(geometry, run.table))
+    return head if geometry is None else replace(head, **place_of(geometry, run.table))
 
 
-def _place(geometry: Mapping[str, Any], run: Table) -> dict[str, Any]:
-    return {
-        "span": span_of(geometry),
-        "cable_diameter": geometry["cable_diameter"],
-        "landing_position": geometry["landing_position"],
-        "robot": robot_of(geometry, run),
-    }
+def _gap(run: Run) -> Gap | None:
+    return gap_of(run.summary.get("geometry"), run.table, line_of(run.fields))
 
 
 def _line(run: Run) -> LinePlace | None:
@@ -137,7 +146,7 @@ def _top(run: Run, manifest: Manifest, data: Packed) -> Html:
     if not landing:
         verdict = _of_the_run(run)
     parts = [header(manifest["resolved"]["title"], verdict, _subtitle(run), run.safety), *_notices(run, manifest, data)]
-    return Html("".join([*parts, tiles(run.summary, run.table, run.summary.get("geometry"))]))
+    return Html("".join([*parts, tiles(run.summary, run.table, run.summary.get("geometry"), _gap(run))]))
 
 
 def _of_the_run(run: Run) -> Verdict:
@@ -196,7 +205,7 @@ def _comparison_top(found: Comparison, first: Run, manifest: Manifest, data: Pac
     kept = "every tolerance is kept" if found.passed else "a tolerance is missed"
     subtitle = f"{_subtitle(first)} · against {found.reference.kind}: {kept}"
     parts = [header(title, verdict, subtitle, said), *_notices(first, manifest, data)]
-    return Html("".join([*parts, tiles(first.summary, first.table, first.summary.get("geometry"))]))
+    return Html("".join([*parts, tiles(first.summary, first.table, first.summary.get("geometry"), _gap(first))]))
 
 
 def _comparison_card(found: Comparison) -> Html:

@@ -15,6 +15,7 @@ from orchestrator.report.signals import DEGREES, NO_UNITS, Panel, panels_for
 
 COLOURS = 8
 DASHES: tuple[list[int], ...] = ([], [7, 4], [2, 3])
+"""Of curves that lie on each other."""
 INPUTS = ("Thrust", "Torque", "Drive torque")
 """Panels of a landing's inputs over time, where they vary."""
 HEIGHT = "robot.body.position.z"
@@ -65,8 +66,7 @@ def _lines(table: Table, names: Mapping[str, str], first: int = 0) -> list[PlotS
 
 
 def _signal(name: str, label: str, i: int) -> PlotSignal:
-    """Return line `i` of a plot: told apart by colour, and by dashes too where several lie on each other."""
-    return PlotSignal(name, label, str(i % COLOURS + 1), DASHES[i % len(DASHES)])
+    return PlotSignal(name, label, str(i % COLOURS + 1), DASHES[i % len(DASHES)] if name in TENSIONS else [])
 
 
 def _forces(table: Table) -> dict[str, str]:

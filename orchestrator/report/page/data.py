@@ -5,6 +5,7 @@ from __future__ import annotations
 import re
 from collections.abc import Iterable, Iterator, Mapping
 from dataclasses import dataclass
+from types import MappingProxyType
 
 import numpy as np
 
@@ -21,6 +22,9 @@ SEEN = re.compile(
     r"|cable\.tension_(left|mid|right)"
 )
 """What is drawn of a landing, or judged."""
+
+
+NO_ARRAYS: Mapping[str, np.ndarray] = MappingProxyType({})
 
 
 @dataclass(frozen=True)
@@ -60,19 +64,24 @@ class Packed:
         )
 
 
-def pack_within(sources: Iterable[Source], most: int) -> Packed:
-    """Pack the signals of all `sources` into at most `most` characters, with as many of their points as that allows."""
+def pack_within(sources: Iterable[Source], most: int, others: Mapping[str, np.ndarray] = NO_ARRAYS) -> Packed:
+    """Pack the signals of all `sources` into at most `most` characters, with as many of their points as that allows.
+
+    Parameters
+    ----------
+    others : arrays that are packed as they are
+    """
     sources, stride = list(sources), 1
-    points = max(len(source.table["time"]) for source in sources)
-    blob = _packed(sources, stride)
+    points = max((len(source.table["time"]) for source in sources), default=0)
+    blob = _packed(sources, stride, others)
     while len(blob.text) > most and stride < points:
         stride *= 2 ** max(1, int(np.log2(len(blob.text) / most)))
-        blob = _packed(sources, stride)
+        blob = _packed(sources, stride, others)
     return Packed(blob, stride, points)
 
 
-def _packed(sources: Iterable[Source], stride: int) -> Blob:
-    arrays = dict[str, np.ndarray]()
+def _packed(sources: Iterable[Source], stride: int, others: Mapping[str, np.ndarray]) -> Blob:
+    arrays = dict(others)
     for source in sources:
         arrays.update(_arrays(source, stride))
     return pack(arrays)

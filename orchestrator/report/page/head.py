@@ -124,6 +124,50 @@ class Shown:
 
 
 @dataclass(frozen=True)
+class Axis:
+    """An axis of a map: its `values`, and `labels` where they are words."""
+
+    label: str
+    unit: str
+    values: list[Any]
+    labels: list[str] | None = None
+
+
+@dataclass(frozen=True)
+class Measure:
+    """What a map can show of its cells: the key of a cell, and how people read it."""
+
+    key: str
+    label: str
+    unit: str
+    factor: float
+    digits: int
+    kind: Literal["margin", "probability"]
+
+
+@dataclass(frozen=True)
+class Map:
+    """The map of a sweep; `cells` have x, y (places on the axes) and, where the outline was refined, their `box`."""
+
+    title: str
+    text: str
+    x: Axis
+    y: Axis | None
+    measures: list[Measure]
+    limits: list[str]
+    limit_names: dict[str, str]
+    cells: list[dict[str, Any]]
+
+
+@dataclass(frozen=True)
+class Landing:
+    """A landing of a sweep that a page holds: the prefix of its arrays, and what its head says instead."""
+
+    prefix: str
+    head: dict[str, Any]
+
+
+@dataclass(frozen=True)
 class LinePlace:
     """The line's arrays: their prefix, and whether they are the nodes of the mesh."""
 
@@ -153,8 +197,10 @@ class Head:
     runs: list[Shown] = field(default_factory=list)
     reference: str | None = None
     thinned: str = ""
+    safety: str = ""
     whatif: Any = None
-    map: Any = None
+    map: Map | None = None
+    landings: dict[str, Landing] = field(default_factory=dict)
 
     def content(self) -> dict[str, Any]:
         """Return it in JSON's types."""

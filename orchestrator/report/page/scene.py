@@ -5,11 +5,7 @@ from __future__ import annotations
 from collections.abc import Mapping
 from typing import Any
 
-import numpy as np
-
 from orchestrator.coupling.run.results import Table
-from orchestrator.landing import workspace
-from orchestrator.landing.safety import NotRecorded, series
 from orchestrator.report.page.head import Robot, Span, Wheel
 
 Geometry = Mapping[str, Any]
@@ -20,6 +16,16 @@ def span_of(geometry: Geometry) -> Span:
     """Return the span with its supports: the left one is the origin."""
     length, rise = geometry["span"], geometry["level_difference"]
     return Span(length, [0.0, 0.0, 0.0], [0.0, length, rise])
+
+
+def place_of(geometry: Geometry, table: Table | None = None) -> dict[str, Any]:
+    """Return span, robot and what else of a head is known from a geometry."""
+    return {
+        "span": span_of(geometry),
+        "cable_diameter": geometry["cable_diameter"],
+        "landing_position": geometry["landing_position"],
+        "robot": robot_of(geometry, table or {}),
+    }
 
 
 def robot_of(geometry: Geometry, table: Table) -> Robot:
@@ -40,16 +46,3 @@ def robot_of(geometry: Geometry, table: Table) -> Robot:
 def _wheel(wheel: Mapping[str, Any]) -> Wheel:
     same = {name: wheel[name] for name in ("mount", "radius", "groove_angle", "axle_yaw", "axle_tilt", "braked")}
     return Wheel(width=wheel["groove_width"], axle=wheel["axle_direction"], **same)
-
-
-def clearance(geometry: Geometry | None, table: Table) -> np.ndarray | None:
-    """Return the least gap (n,) m of rotor plane and line at any wheel; None where size or signals are not known."""
-    size = geometry["robot"]["size"] if geometry else None
-    if not geometry or not size or size["along"] is None:
-        return None
-    try:
-        rolls = series("roll", table)
-    except NotRecorded:
-        return None
-    arm = geometry["robot"]["line_above_rotors"]
-    return np.min([workspace.clearance(arm, size["along"], roll) for roll in rolls.values()], axis=0)

@@ -10,13 +10,16 @@ import numpy as np
 
 from orchestrator.coupling.run.results import Table
 from orchestrator.landing.safety import readable
+from orchestrator.report.page.gap import Gap
 from orchestrator.report.page.head import Verdict
 from orchestrator.report.page.html import Html, tag
-from orchestrator.report.page.scene import Geometry, clearance
+from orchestrator.report.page.scene import Geometry
 from orchestrator.report.signals import LABELS
 
 KILO = 1e4
 """N or J, from which on thousands are counted."""
+CENTI = 0.1
+"""m or m/s, below which thousandths are counted."""
 SIGNS = {"deg": "°", "1": ""}
 
 
@@ -40,10 +43,10 @@ def header(title: str, verdict: Verdict, subtitle: str, said: str = "") -> Html:
     return tag("header", (badge, tag("div", lines)))
 
 
-def tiles(said: Mapping[str, Any], table: Table, geometry: Geometry | None) -> Html:
+def tiles(said: Mapping[str, Any], table: Table, geometry: Geometry | None, gap: Gap | None) -> Html:
     """Return the tiles of a landing: a limit each, then the largest force and the least gap."""
     found = [_limit_tile(name, judged) for name, judged in said.get("limits", {}).items()]
-    found += [*_force_tile(table, geometry), *_gap_tile(table, geometry)]
+    found += [*_force_tile(table, geometry), *_gap_tile(geometry, gap)]
     return tag("section", found, class_="tiles", aria_label="Margins") if found else Html()
 
 
@@ -66,6 +69,8 @@ def measured(value: float | None, unit: str, digits: int = 3) -> str:
         return f"{100.0 * number:.{digits}g} %"
     if unit in ("N", "J") and abs(number) >= KILO:
         number, unit = number / 1e3, f"k{unit}"
+    if unit in ("m", "m/s") and abs(number) < CENTI:
+        number, unit = 1e3 * number, f"m{unit}"
     sign = SIGNS.get(unit, f" {unit}")
     return f"{number + 0.0:.{digits}g}{sign}"
 
@@ -99,11 +104,10 @@ def _weight(geometry: Geometry | None) -> float | None:
     return geometry["robot"].get("weight") if geometry else None
 
 
-def _gap_tile(table: Table, geometry: Geometry | None) -> Iterator[Html]:
-    gap = clearance(geometry, table)
+def _gap_tile(geometry: Geometry | None, gap: Gap | None) -> Iterator[Html]:
     if gap is None or geometry is None:
         return
-    row, level = int(np.argmin(gap)), abs(geometry["robot"]["line_above_rotors"])
-    note = f"of {1e3 * level:.0f} mm when level; at {table['time'][row]:.2f} s"
-    used = 1.0 - float(gap[row]) / level
-    yield tile("Least rotor–line gap", f"{1e3 * gap[row]:.0f} mm", note, used, data_tile="clearance")
+    row, level = int(np.argmin(gap.size)), abs(geometry["robot"]["line_above_rotors"])
+    note = f"of {1e3 * level:.0f} mm over a straight line; at {gap.time[row]:.2f} s"
+    used = 1.0 - float(gap.size[row]) / level
+    yield tile("Least rotor–line gap", f"{1e3 * gap.size[row]:.0f} mm", note, used, data_tile="clearance")

@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+import warnings
 from collections.abc import Mapping
 from dataclasses import dataclass
 from functools import cached_property
@@ -80,6 +81,8 @@ def run(
     read = _study(study)
     folder = write.place_of(Path(out) if out is not None else None, read)
     swept = run_all(read, folder / write.STORE, lambda found: write.save(folder, found), workers, timeout, progress)
+    if (missing := write.page(folder)) is not None:
+        warnings.warn(missing, stacklevel=3)
     return Sweep(folder, swept)
 
 

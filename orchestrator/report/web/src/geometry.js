@@ -43,24 +43,32 @@ export function rotors({ across, along, rotor_plane: z = 0 }) {
   return { radius, centres: [[-x, -y, z], [x, -y, z], [-x, y, z], [x, y, z]] };
 }
 
-// Gap between the rotors' plane and the line where the rim is nearest, as the limit of the roll has it (eq. 1 of Jia et
-// al. 2025): |arm| cos(roll) - (along / 2) |sin(roll)|, with the roll against the line at a wheel. Returns {least, before,
-// after} in m: before and after are the rims towards the left and the right support. Null where it cannot be said.
-export function clearance(model, t, prefix = '') {
-  const { robot } = model.head, pose = model.pose(t, prefix);
-  if (!robot?.along || !pose) return null;
-  const gaps = model.contacts.map(k => gapsAt(model, t, prefix, k, robot, pose)).filter(Boolean);
-  if (!gaps.length) return null;
-  const [before, after] = [0, 1].map(side => Math.min(...gaps.map(gap => gap[side])));
-  return { least: Math.min(before, after), before, after };
-}
+const SAMPLES = 48;
 
-function gapsAt(model, t, prefix, k, robot, pose) {
-  const { point, tangent } = touch(model, t, prefix, k);
-  if (![...point, ...tangent].every(Number.isFinite)) return null;
-  const roll = pose.angles[0] - Math.atan2(tangent[2], tangent[1]), arm = Math.abs(robot.line ?? toBody(pose, point)[2]);
-  const level = arm * Math.cos(roll), tip = robot.along / 2 * Math.sin(roll) * (robot.layout === 'bottom' ? -1 : 1);
-  return [level + tip, level - tip];
+// Least distance between the rotors' plane and the line as it is bent, along z_B over the robot's length: {least, before,
+// after} in m, towards the left and the right support. Negative: the line cuts the plane. Null where it cannot be said.
+// The same as orchestrator/report/page/gap.py.
+export function clearance(model, t, prefix = '') {
+  const { robot, line } = model.head, pose = model.pose(t, prefix);
+  const nodes = line && model.line(t, prefix + model.linePrefix);
+  if (!robot?.along || !pose || !nodes) return null;
+  const sign = robot.layout === 'bottom' ? -1 : 1, half = robot.along / 2, matrix = rotation(pose.angles);
+  const middle = contactArc(model, t, prefix), found = { before: Infinity, after: Infinity }, p = [0, 0, 0];
+  const take = (y, z) => {
+    const gap = sign * (z - (robot.rotor_plane ?? 0)), side = y < 0 ? 'before' : 'after';
+    if (gap < found[side]) found[side] = gap;
+  };
+  let last = null;
+  for (let i = 0; i <= SAMPLES; i++) {
+    const s = middle + 1.3 * half * (2 * i / SAMPLES - 1);
+    if (s < nodes.s[0] || s > nodes.s[nodes.s.length - 1]) continue;
+    const [, y, z] = toBody(pose, hermite(nodes, s, p), matrix);
+    for (const rim of [-half, half]) if (last && (last.y - rim) * (y - rim) < 0) take(rim, last.z + (z - last.z) * (rim - last.y) / (y - last.y));
+    if (Math.abs(y) <= half) take(y, z);
+    last = { y, z };
+  }
+  const least = Math.min(found.before, found.after);
+  return Number.isFinite(least) ? { least, ...found } : null;
 }
 
 // Point and tangent of the line at a wheel: as the cable says, else from the shape.

@@ -1,6 +1,7 @@
 // Starts the page: reads what it holds, puts the parts together, says when it is ready.
 import { App } from './app.js';
 import { read } from './model.js';
+import { whatif } from './whatif.js';
 
 const started = performance.now();
 const page = window.__page = { ready: false, frames: 0, time: 0, playing: false, errors: [] };
@@ -11,6 +12,7 @@ async function start() {
   const app = new App(await read(document), page);
   page.app = app;
   await app.begin();
+  app.guard('what-if', () => whatif(app));
   page.ready = true;
   page.load_ms = performance.now() - started;
   page.since_navigation_ms = performance.now();

@@ -163,7 +163,7 @@ export class SweepMap {
     this.said.textContent = `${cell.words} …`;
     try {
       const opened = await this.app.open(cell);
-      this.said.textContent = opened ? `${cell.words}: shown above` : `${cell.words}: its signals were not kept, and it cannot be solved here`;
+      this.said.textContent = opened ? `${cell.words}: shown in the replay and the plots` : `${cell.words}: its signals were not kept, and it cannot be solved here`;
       return opened;
     } catch (error) {
       this.said.textContent = `${cell.words}: ${error.message ?? error}`;

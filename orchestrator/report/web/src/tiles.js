@@ -4,19 +4,21 @@ import { fixed } from './dom.js';
 
 const DEGREES = 180 / Math.PI;
 const READABLE = { rad: ['°', DEGREES, 1], m: ['mm', 1000, 0], N: ['kN', 1e-3, 2], 1: ['%', 100, 1] };
+const BEYOND = { kept: 'margin', unclear: 'margin, not clear,', exceeded: 'exceeded by' };
 
 export function readable(value, unit) {
   const [name, factor, digits] = READABLE[unit] ?? [unit, 1, 2];
-  return `${fixed(value * factor, digits)} ${name}`;
+  return `${fixed(value * factor, digits)}${name === '°' ? '' : ' '}${name}`;
 }
 
 export class Tiles {
   constructor(app) {
     this.app = app;
     this.verdict = document.querySelector('.verdict');
+    this.covers = document.getElementById('covers');
     this.note = document.querySelector('.what-if-note');
-    this.kept = [...document.querySelectorAll('.tile[data-limit]')].map(tile => ({ tile, html: tile.innerHTML, style: tile.className }));
-    this.word = this.verdict && { text: this.verdict.textContent, style: this.verdict.className };
+    this.kept = [...document.querySelectorAll('.tile')].map(tile => ({ tile, html: tile.innerHTML, style: tile.className }));
+    this.word = this.verdict && { text: this.verdict.textContent, style: this.verdict.className, covers: this.covers?.textContent };
   }
 
   show(model, note) {
@@ -25,11 +27,13 @@ export class Tiles {
     if (original) return this.#restore();
     const { word, class: name } = model.head.verdict ?? { word: 'not judged', class: 'none' };
     if (this.verdict) Object.assign(this.verdict, { textContent: word, className: `verdict ${name}` });
-    for (const { tile } of this.kept) this.#fill(tile, model.head.limits?.[tile.dataset.limit]);
+    if (this.covers) this.covers.textContent = model.head.safety ?? '';
+    for (const { tile } of this.kept) this.#fill(tile, model);
   }
 
   #restore() {
     if (this.verdict) Object.assign(this.verdict, { textContent: this.word.text, className: this.word.style });
+    if (this.covers) this.covers.textContent = this.word.covers;
     for (const { tile, html, style } of this.kept) Object.assign(tile, { innerHTML: html, className: style });
   }
 
@@ -41,12 +45,56 @@ export class Tiles {
     this.note.hidden = !note;
   }
 
-  #fill(tile, limit) {
-    const [value, small, bar] = [tile.querySelector('b'), tile.querySelector('small'), tile.querySelector('.bar i')];
-    const known = limit && Number.isFinite(limit.worst), used = known && limit.limit ? Math.abs(limit.worst / limit.limit) : 0;
-    if (value) value.textContent = known ? readable(limit.worst, limit.unit) : '–';
-    if (small) small.textContent = known ? `limit ${readable(limit.limit, limit.unit)}, margin ${readable(limit.margin, limit.unit)}` : 'not judged';
-    if (bar) bar.style.width = `${Math.min(100, 100 * used)}%`;
-    tile.classList.toggle('over', used > 1);
+  #fill(tile, model) {
+    const { limit, tile: kind } = tile.dataset;
+    const { value, small, used, over = false } = limit ? ofLimit(model, limit) : (OTHERS[kind]?.(model) ?? NOTHING);
+    const write = (selector, text) => { const part = tile.querySelector(selector); if (part) part.textContent = text; };
+    write('b', value);
+    write('small', small);
+    const bar = tile.querySelector('.bar i');
+    if (bar) bar.style.width = `${Math.min(100, 100 * Math.max(0, used ?? 0))}%`;
+    bar?.parentElement.setAttribute('aria-label', used === undefined ? 'not known' : `${fixed(100 * used, 0)} % of the limit used`);
+    tile.classList.toggle('over', over);
   }
 }
+
+const NOTHING = { value: '–', small: 'not known of what is shown' };
+
+function ofLimit(model, name) {
+  const judged = model.head.limits?.[name];
+  if (!judged || !Number.isFinite(judged.worst)) return { value: '–', small: judged ? 'not finite' : `not judged: ${model.head.not_judged?.[name] ?? 'not known'}`, over: Boolean(judged) };
+  const { unit, limit, margin, share, time, wheel, verdict } = judged, at = ` at ${fixed(time, 2)} s${wheel ? `, wheel ${wheel}` : ''}`;
+  const small = `limit ${readable(limit, unit)}: ${BEYOND[verdict] ?? 'margin'} ${readable(Math.abs(margin), unit)}${at}`;
+  return { value: readable(Math.abs(judged.worst), unit), small, used: share, over: verdict === 'exceeded' };
+}
+
+// The largest force of all wheels, within the steps where that is known.
+function largestForce(model) {
+  let top = null;
+  for (const k of model.contacts) {
+    const values = model.get(`contact${k}.normal_force_max`) ?? model.get(`contact${k}.normal_force`) ?? [];
+    values.forEach((x, i) => { if (!top || x > top.x) top = { x, i, k }; });
+  }
+  if (!top) return NOTHING;
+  const wheel = model.contacts.length > 1 ? `, wheel ${top.k}` : '';
+  return { value: top.x >= 1e4 ? `${fixed(top.x / 1e3, 1)} kN` : `${fixed(top.x, 0)} N`, small: `at ${fixed(model.time[top.i], 2)} s${wheel}` };
+}
+
+// The gap between line and rim of the rotor plane, from the roll against the line: as orchestrator/landing/workspace.py.
+function leastGap(model) {
+  const { robot } = model.head, roll = model.get('robot.roll'), level = Math.abs(robot?.line ?? NaN);
+  if (!roll || !Number.isFinite(level) || !Number.isFinite(robot.along ?? NaN)) return NOTHING;
+  let least = null;
+  for (const k of model.contacts) {
+    const [y, z] = ['y', 'z'].map(axis => model.get(`cable.port[${k}].tangent.${axis}`));
+    if (!y || !z) return NOTHING;
+    roll.forEach((angle, i) => {
+      const against = angle - Math.atan2(z[i], y[i]), gap = level * Math.cos(against) - 0.5 * robot.along * Math.abs(Math.sin(against));
+      if (!least || gap < least.gap) least = { gap, i };
+    });
+  }
+  const small = `of ${fixed(1e3 * level, 0)} mm when level; at ${fixed(model.time[least.i], 2)} s`;
+  return { value: `${fixed(1e3 * least.gap, 0)} mm`, small, used: 1 - least.gap / level };
+}
+
+const OTHERS = { force: largestForce, clearance: leastGap };
