@@ -118,7 +118,8 @@ def _places(n_wheels: int, shift: float) -> dict[str, np.ndarray]:
         centre = body + turned.apply([0.0, _along(k - 1, n_wheels), 0.2152])
         vectors = {
             f"robot.wheel[{k}].position": centre, f"cable.port[{k}].position": centre - [0.0, 0.0, 0.0532],
-            f"robot.wheel[{k}].axle": turned.apply([1.0, 0.0, 0.0]), f"cable.port[{k}].tangent": np.tile([0.0, 1.0, 0.0], (TIME.size, 1)),
+            f"robot.wheel[{k}].axle": turned.apply([1.0, 0.0, 0.0]),
+            f"cable.port[{k}].tangent": np.tile([0.0, 1.0, 0.0], (TIME.size, 1)),
             f"contact{k}.wheel.force": np.tile([0.0, 0.0, 400.0], (TIME.size, 1)),
         }  # fmt: skip
         table |= {f"{name}.{axis}": values[:, i] for name, values in vectors.items() for i, axis in enumerate("xyz")}
@@ -128,7 +129,7 @@ def _places(n_wheels: int, shift: float) -> dict[str, np.ndarray]:
 
 
 def swept(folder: Path) -> Path:
-    """The folder of a sweep of two places and two masses that is made up; the third run has left no signals, the last is unsafe."""
+    """The folder of a made-up sweep of two places and two masses; the third run has left no signals, the last is unsafe."""
     cells, rows = [], []
     for i, (place, mass) in enumerate(product((20.0, 60.0), (38.0, 80.0)), start=1):
         run = on_a_line()
@@ -146,8 +147,8 @@ def swept(folder: Path) -> Path:
         verdict = "safe" if said["safe"] else "unsafe"
         cells.append({
             "at": [place, mass], "areas": [[[place - 20.0, place + 20.0], [mass - 21.0, mass + 21.0]]],
-            "margin": margins[binding], "binding": binding, "verdict": verdict, "margins": margins, "probability": None, "run": i, "folder": f"runs/run{i}",
-            "recorded": i != 3, "runs": [i], "failed": 0,
+            "margin": margins[binding], "binding": binding, "verdict": verdict, "margins": margins, "probability": None,
+            "run": i, "folder": f"runs/run{i}", "recorded": i != 3, "runs": [i], "failed": 0,
         })  # fmt: skip
         rows.append(f"{i},{place},{mass},{int(said['safe'])},{margins[binding]},{binding},{said['safety']},")
     axes = [
