@@ -79,8 +79,8 @@ def parameters_now(scenario: LandingScenario, module: Mapping[str, Value]) -> Ma
     module : the other parameters of our cable, of the bare line
 
     The line is strung bare, at the temperature of stringing. Then the unstretched length grows with the temperature,
-    L = L0 (1 + α (T - T0)), and ice of thickness t around the diameter D adds π ρ t (D + t) of mass, which is spread along
-    the line. The ice is weight and inertia; it neither stiffens the line nor changes what a wheel or the air meets.
+    L = L0 (1 + α (T - T0)), its mass being what it was, and ice of thickness t around the diameter D adds π ρ t (D + t) of
+    mass a metre. The ice is weight and inertia; it neither stiffens the line nor changes what a wheel or the air meets.
 
     Raises
     ------
@@ -94,7 +94,7 @@ def parameters_now(scenario: LandingScenario, module: Mapping[str, Value]) -> Ma
     check_bounds(bare.table, bare.values, "cable")
     length = _strung_length(bare.stringing(), state, scenario.limits.rated_strength) * state.growth
     ice = pi * state.ice_density * state.ice_thickness * (bare["diameter"] + state.ice_thickness)
-    return {"unstretched_length": length} | ({"linear_density": bare["linear_density"] + ice} if ice else {})
+    return {"unstretched_length": length, "linear_density": bare["linear_density"] / state.growth + ice}
 
 
 def _strung_length(line: Stringing, state: StateSection, strength: float | None) -> float:
