@@ -1,44 +1,14 @@
 """Maps of a sweep: the worst of all runs at a place, stretches that are safe, pictures that can be read."""
 
-from collections.abc import Callable
 from pathlib import Path
 
 import numpy as np
 import pytest
+from swept import ALONG, MASSES, hump, swept
 
 from orchestrator.coupling.errors import InputError
-from orchestrator.runs.job import Done
-from orchestrator.studies.sweep import design, maps
-from orchestrator.studies.sweep.outcome import Outcome
+from orchestrator.studies.sweep import maps
 from orchestrator.studies.sweep.ranges import all_ranges, cell, safe_ranges, stretches
-from orchestrator.studies.sweep.study import Study, study_of
-
-ALONG = {"landing.position": {"from": 20.0, "to": 80.0, "count": 7, "unit": "m"}}
-MASSES = {"robot.parameters.mass": [10.0, 38.0]}
-Margins = Callable[[float, float], dict[str, float] | None]
-
-
-def swept(vary: dict, margins: Margins) -> tuple[Study, list[Outcome]]:
-    """Return a study, and outcomes with margins (share of the limit) of position and mass; None: the run failed."""
-    study = study_of({"scenario": "landing_200m_point9", "vary": vary}, Path("study.toml"))
-    return study, [_outcome(study, row, margins) for row in design.rows(study)]
-
-
-def _outcome(study: Study, row: design.Row, margins: Margins) -> Outcome:
-    inputs = row.inputs
-    found = margins(float(inputs.get("landing.position", 0.0)), float(inputs.get("robot.parameters.mass", 10.0)))
-    done = Done(design.job(study, row), None, "crashed" if found is None else None)
-    limits = {
-        name: {"share": 1.0 - value, "verdict": "kept" if value > 0.0 else "exceeded"}
-        for name, value in (found or {}).items()
-    }
-    vars(done)["summary"] = {"safe": all(value > 0.0 for value in (found or {}).values()), "limits": limits}
-    return Outcome(row, done)
-
-
-def hump(position: float, mass: float) -> dict[str, float]:
-    """Exceeds `z` in the middle, `roll` with a mass of 38 kg near the tower."""
-    return {"z": abs(position - 50.0) / 25.0 - 0.5, "roll": 0.5 if mass < 20.0 else (position - 25.0) / 40.0}
 
 
 def test_the_worst_of_all_runs_stands_for_a_place():

@@ -17,6 +17,7 @@ from orchestrator.studies.sweep import probability
 from orchestrator.studies.sweep.design import Row, job, rows
 from orchestrator.studies.sweep.outcome import Chances, Outcome, chances
 from orchestrator.studies.sweep.ranges import all_ranges
+from orchestrator.studies.sweep.refine import more_rows
 from orchestrator.studies.sweep.study import FEWEST_SCRAMBLES, Study
 
 Told = Callable[[int, int, int], None]
@@ -91,6 +92,8 @@ def sweep(
             first, found.stopped = end, end < ends[-1]
             if _knows_enough(found):
                 break
+        while added := more_rows(study, found.outcomes):
+            _Look(found, added, save, told).made(batches)
     found.complete = True
     save(found)
     return found

@@ -12,11 +12,12 @@ import numpy as np
 from orchestrator.coupling.errors import InputError
 from orchestrator.coupling.run.results import read_json, replacing, write_json
 from orchestrator.runs.directory import circumstances
+from orchestrator.studies.sweep import atlas
 from orchestrator.studies.sweep.outcome import cells
 from orchestrator.studies.sweep.solve import Swept, describe
 from orchestrator.studies.sweep.study import Study
 
-STORE, TABLE, RESULT = "runs", "table.csv", "study.json"
+STORE, TABLE, MAP, RESULT = atlas.STORE, "table.csv", "map.json", "study.json"
 ALWAYS = ("safe", "least_margin")
 """Columns that are there even where nothing is judged."""
 Columns = dict[str, np.ndarray]
@@ -48,9 +49,10 @@ def _require_same(folder: Path, study: Study) -> None:
 
 
 def save(folder: Path, found: Swept) -> None:
-    """Write the table, then ``study.json``: what is complete has both."""
+    """Write table and maps, then ``study.json``: what is complete has all."""
     rows = [cells(found.study, outcome) for outcome in found.outcomes]
     write_rows(folder / TABLE, rows)
+    write_json(folder / MAP, atlas.content(found))
     write_json(folder / RESULT, {**describe(found), **circumstances()})
 
 
