@@ -13,8 +13,9 @@ import numpy as np
 import pytest
 
 from orchestrator.coupling.errors import InputError
-from orchestrator.runs.batch import ONE_THREAD, run_batch
+from orchestrator.runs.batch import run_batch
 from orchestrator.runs.job import Job, found, make
+from orchestrator.runs.worker import ONE_THREAD
 
 
 def job(stop: float = 0.2, **options) -> Job:

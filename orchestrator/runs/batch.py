@@ -7,11 +7,10 @@ batch that was interrupted goes on where it was.
 from __future__ import annotations
 
 import os
-from collections.abc import Callable, Iterator, Sequence
+from collections.abc import Callable, Iterable, Iterator, Sequence
 from concurrent.futures import Future, as_completed
 from concurrent.futures import TimeoutError as RanTooLong
-from contextlib import ExitStack, contextmanager
-from multiprocessing import get_context
+from contextlib import ExitStack
 from pathlib import Path
 from typing import Any, Self
 
@@ -20,14 +19,14 @@ from pebble import ProcessExpired, ProcessPool
 from fmus.face.first_use import compile_modules
 from fmus.kernels.jit import is_compiled
 from orchestrator.coupling.errors import InputError
-from orchestrator.runs.job import Done, Job, found, make
+from orchestrator.runs import worker
+from orchestrator.runs.job import Done, Job, found, make, remove_half_done
 from orchestrator.scenario.types import LandingScenario
 
 Counted = Callable[[int, int], None]
 """Told how many runs are done, and of how many."""
 Ended = Callable[[Done], None]
 """Told of each run as it has ended."""
-ONE_THREAD = ("OPENBLAS_NUM_THREADS", "OMP_NUM_THREADS", "MKL_NUM_THREADS", "VECLIB_MAXIMUM_THREADS")
 COMPILED = {"monolithic": "orchestrator.landing.monolithic", "coupled": "fmus.cable"}
 """The package whose kernels each solver needs last."""
 
@@ -99,7 +98,7 @@ class Batches:
         """Yield each run of `left` as it is finished."""
         if any(isinstance(job.loaded(), LandingScenario) for job in left.values()):
             compile_modules()
-        pool, alone = self._started(), _first_of_its_kind(left)
+        pool, alone = self._started({job.solver for job in left.values()}), _first_of_its_kind(left)
         for keys, limit in ((alone, None), ([key for key in left if key not in alone], self.timeout)):
             futures: dict[Future[None], str] = {
                 pool.schedule(make, args=(left[key], self.store), timeout=limit): key for key in keys
@@ -108,11 +107,12 @@ class Batches:
                 key = futures[future]
                 yield key, _ended(left[key], self.store, future)
 
-    def _started(self) -> ProcessPool:
+    def _started(self, solvers: Iterable[str]) -> ProcessPool:
         """Return the workers, started if they are not yet."""
         if self._pool is None:
             self.store.mkdir(parents=True, exist_ok=True)
-            self._pool = self._open.enter_context(_pool(self.workers))
+            remove_half_done(self.store)
+            self._pool = self._open.enter_context(worker.pool(self.workers, solvers))
         return self._pool
 
 
@@ -138,43 +138,6 @@ def _first_of_its_kind(left: dict[str, Job]) -> list[str]:
     """Return the runs that go first, alone and without a time limit: they compile the kernels that the others load."""
     kinds = {job.solver: key for key, job in reversed(left.items())}
     return [key for solver, key in kinds.items() if not is_compiled(COMPILED[solver])]
-
-
-@contextmanager
-def _pool(workers: int) -> Iterator[ProcessPool]:
-    """Give worker processes with one BLAS thread each; what still runs at an interruption is ended."""
-    with _one_thread():
-        pool = ProcessPool(workers, initializer=_begin, context=get_context("spawn"))  # type: ignore[arg-type]
-        try:
-            yield pool
-            pool.close()
-        except BaseException:
-            pool.stop()
-            raise
-        finally:
-            pool.join()
-
-
-@contextmanager
-def _one_thread() -> Iterator[None]:
-    """Let the processes started within have one thread each: a library reads that as it is loaded."""
-    before = {name: os.environ.get(name) for name in ONE_THREAD}
-    os.environ.update(dict.fromkeys(ONE_THREAD, "1"))
-    try:
-        yield
-    finally:
-        for name, value in before.items():
-            os.environ.pop(name) if value is None else os.environ.update({name: value})
-
-
-def _begin() -> None:
-    """Leave Ctrl-C to the process that has started this one, and say nothing on its terminal."""
-    import signal
-
-    from fmus.kernels import notice
-
-    signal.signal(signal.SIGINT, signal.SIG_IGN)
-    notice.muted = True
 
 
 def _ended(job: Job, store: Path, future: Future[Any]) -> Done:

@@ -177,6 +177,26 @@ def make(job: Job, store: Path) -> None:
     _move(temporary, store / job.key)
 
 
+def remove_half_done(store: Path) -> None:
+    """Remove what runs have left in `store` whose process is no more: it was killed, or the disk was full."""
+    for folder in store.glob(".*.*"):
+        process = folder.suffix.removeprefix(".")
+        if process.isdecimal() and not _is_running(int(process)):
+            shutil.rmtree(folder, ignore_errors=True)
+
+
+def _is_running(process: int) -> bool:
+    if os.name != "posix":  # elsewhere to ask is to end it
+        return True
+    try:
+        os.kill(process, 0)
+    except ProcessLookupError:
+        return False
+    except OSError:  # it is another user's, or the system cannot tell
+        return True
+    return True
+
+
 def _manifest(job: Job, scenario: Scenario) -> dict[str, Any]:
     resolved = scenario.model_dump(exclude_none=True)
     return {"job": asdict(job), "scenario": str(scenario.path), "resolved": resolved, "code": code_version()}
