@@ -4,6 +4,7 @@ from __future__ import annotations
 
 import time
 from collections.abc import Callable, Sequence
+from contextlib import suppress
 from dataclasses import dataclass, field
 from math import inf
 from pathlib import Path
@@ -133,7 +134,8 @@ class _Look:
             raise self._in_words(error) from None
         except BaseException:
             self._gather()
-            self.save(self.found)
+            with suppress(OSError):  # of a full disk the table that is there stays
+                self.save(self.found)
             raise
         self.done |= {one.job.key: one for one in ended}
         self._gather()
