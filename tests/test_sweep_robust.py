@@ -16,6 +16,8 @@ from tests.fmus import compiled, needs_compiler
 
 CRASHES, HANGS, HARMLESS = 20, 21, 100
 """Faults of tests/fmus/lag2.c; those from `HARMLESS` on are none."""
+PATIENCE = 8.0
+"""s that a run may take; one that does not hang takes 0.03 s, and at first, on a busy machine, some more."""
 SCENARIO = """
 title = "p' = q, q' = -p"
 connections = ["p.y -> q.u", "q.y -> p.u"]
@@ -113,7 +115,7 @@ def require_only_the_faulty_failed(out: Path, count: int) -> None:
 @needs_compiler
 @ONLY_LINUX
 def test_runs_that_crash_and_hang_cost_themselves_alone_though_the_sweep_is_killed(tmp_path: Path):
-    study, out = study_in(tmp_path, 25, 2, 1.5), tmp_path / "out"
+    study, out = study_in(tmp_path, 25, 2, PATIENCE), tmp_path / "out"
     first = started(study, out)
     wait_until(lambda: len(list(out.glob("runs/*/manifest.json"))) >= 10 or first.poll() is not None, 120.0)
     made = {path: path.stat().st_mtime_ns for path in out.glob("runs/*/manifest.json")}
@@ -128,7 +130,7 @@ def test_runs_that_crash_and_hang_cost_themselves_alone_though_the_sweep_is_kill
 @needs_compiler
 @ONLY_LINUX
 def test_five_hundred_runs_killed_at_ten_random_moments(tmp_path: Path):
-    study, out, undisturbed = study_in(tmp_path, 50, 10, 2.0), tmp_path / "out", tmp_path / "undisturbed"
+    study, out, undisturbed = study_in(tmp_path, 50, 10, PATIENCE), tmp_path / "out", tmp_path / "undisturbed"
     start = time.monotonic()
     assert finished(study, undisturbed)[0] == 1
     alone, chance = time.monotonic() - start, random.Random(1)

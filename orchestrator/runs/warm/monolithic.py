@@ -9,7 +9,7 @@ import numpy as np
 from fmus.kernels.jit import is_compiled
 from orchestrator.coupling.errors import InputError
 from orchestrator.landing import monolithic
-from orchestrator.runs.job import Job
+from orchestrator.runs.job import Job, code_version
 from orchestrator.runs.systems import resolve
 
 SCENARIO = "landing_200m_point9"
@@ -23,6 +23,7 @@ def load() -> None:
         monolithic.solve(problem, np.array([0.0, 1e-3]), 1e-5, estimate=False)
 
 
+code_version()
 if is_compiled("orchestrator.landing.monolithic") and is_compiled("fmus"):
     with suppress(InputError):  # whoever runs it will be told
         load()
