@@ -31,7 +31,7 @@ def sweep(
     """
     with importing():
         from orchestrator.coupling.errors import DONE, MISSED
-        from orchestrator.studies.sweep import maps, write
+        from orchestrator.studies.sweep import bars, maps, write
         from orchestrator.studies.sweep.solve import sweep as run_all
         from orchestrator.studies.sweep.study import load_study, path_of
 
@@ -41,8 +41,8 @@ def sweep(
         found = run_all(read, folder / write.STORE, lambda swept: write.save(folder, swept), workers, timeout, told)
     _print(found)
     print(f"table in {folder / write.TABLE}")
-    for path in maps.write(folder, read, found.outcomes):
-        print(f"map in {path}")
+    for path in [*maps.write(folder, read, found.outcomes), *bars.write(folder, found.sensitivities)]:
+        print(f"picture in {path}")
     raise typer.Exit(MISSED if found.failed else DONE)
 
 
@@ -56,6 +56,8 @@ def _print(found: Swept) -> None:
         print(line)
     if found.chances:
         printing.print_table(write.CHANCES, write.chance_rows(found))
+    if found.sensitivities:
+        printing.print_table(write.INDICES, write.index_rows(found))
     for outcome in found.failed:
         printing.complain(f"run {outcome.row.number}: {outcome.done.failure}")
 

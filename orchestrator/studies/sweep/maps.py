@@ -14,8 +14,7 @@ from matplotlib.colors import TwoSlopeNorm
 from matplotlib.figure import Figure
 from matplotlib.image import AxesImage
 
-from orchestrator.coupling.run.results import replacing
-from orchestrator.report.style import BLACK, BLUE, GREY, STYLE, VERMILION
+from orchestrator.report.style import BLACK, BLUE, GREY, STYLE, VERMILION, save_figure
 from orchestrator.studies.sweep.design import bare
 from orchestrator.studies.sweep.outcome import Outcome
 from orchestrator.studies.sweep.ranges import Cell, cell, is_number, line, safe_ranges, unit_of, values_of
@@ -41,12 +40,7 @@ def write(folder: Path, study: Study, outcomes: Sequence[Outcome]) -> list[Path]
     keys = [key for key, values in study.values.items() if len(values) > 1][:2]
     if not keys or not any(outcome.margins for outcome in outcomes):
         return []
-    figure = draw(study, outcomes, *keys)
-    paths = [folder / f"map.{kind}" for kind in ("png", "pdf")]
-    for path in paths:
-        with replacing(path) as temporary, matplotlib.rc_context(STYLE):
-            figure.savefig(temporary, dpi=STYLE["savefig.dpi"])
-    return paths
+    return save_figure(draw(study, outcomes, *keys), folder / "map")
 
 
 def _figure(width: float, height: float) -> tuple[Figure, Axes]:

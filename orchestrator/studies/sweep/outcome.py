@@ -70,22 +70,31 @@ class Outcome:
 
 def cells(study: Study, outcome: Outcome) -> dict[str, Any]:
     """Return a row of the table; None where something is not known."""
-    summary, margins = outcome.done.summary, outcome.margins
+    summary = outcome.done.summary
     found: dict[str, Any] = {"run": outcome.row.number, **outcome.row.inputs}
     if study.sample is not None:
         found["scramble"] = outcome.row.block
+    if study.sensitivity is not None:
+        found["part"] = outcome.row.part
     found |= {
         "safe": outcome.safe,
-        "least_margin": margins.get(outcome.binding),
+        "least_margin": None,
         "binding": outcome.binding,
         "verdict": summary.get("safety", ""),
     }
+    found |= measured(study, outcome)
+    return found | {"failure": outcome.done.failure or "", "folder": outcome.done.job.key}
+
+
+def measured(study: Study, outcome: Outcome) -> dict[str, Any]:
+    """Return the columns of how a landing went, in numbers; None where one is not known."""
+    margins = outcome.margins
+    found: dict[str, Any] = {"least_margin": margins.get(outcome.binding)}
     for name in UNITS:
         judged = outcome.limits.get(name, {})
         found |= {f"margin.{name}": margins.get(name), f"worst.{name}": judged.get("worst")}
         found[f"error.{name}"] = judged.get("estimated_error")
-    found |= dict(_extremes(study, summary))
-    return found | {"failure": outcome.done.failure or "", "folder": outcome.done.job.key}
+    return found | dict(_extremes(study, outcome.done.summary))
 
 
 def _extremes(study: Study, summary: Mapping[str, Any]) -> Iterator[tuple[str, Any]]:
@@ -117,8 +126,9 @@ def chances(study: Study, outcomes: Sequence[Outcome], looks: int = 1) -> list[C
     """Return how probable it is that limits hold, for each combination of what varies; none without a sample."""
     if study.sample is None or not outcomes:
         return []
-    there = {outcome.row.group for outcome in outcomes}
-    return [_chances(study, i, where, outcomes, looks) for i, where in enumerate(groups(study)) if i in there]
+    sampled = [outcome for outcome in outcomes if not outcome.row.part]
+    there = {outcome.row.group for outcome in sampled}
+    return [_chances(study, i, where, sampled, looks) for i, where in enumerate(groups(study)) if i in there]
 
 
 def _chances(study: Study, group: int, where: Mapping[str, Any], every: Sequence[Outcome], looks: int) -> Chances:

@@ -12,6 +12,7 @@ from orchestrator.runs.result import pandas_module
 from orchestrator.studies.sweep import write
 from orchestrator.studies.sweep.outcome import Chances
 from orchestrator.studies.sweep.ranges import all_ranges
+from orchestrator.studies.sweep.sensitivity import Sensitivity
 from orchestrator.studies.sweep.solve import Swept, Told
 from orchestrator.studies.sweep.solve import sweep as run_all
 from orchestrator.studies.sweep.study import Study, load_study, path_of, study_of
@@ -49,6 +50,11 @@ class Sweep:
     def probability(self) -> list[Chances]:
         """How probable it is that limits hold, for each combination of what varies (`where`): `of` ``all``, and of each."""
         return self.swept.chances
+
+    @property
+    def sensitivity(self) -> list[Sensitivity]:
+        """What margins and extremes hang on, for each combination of what varies: `of` a column, of a parameter."""
+        return self.swept.sensitivities
 
     @property
     def safe_ranges(self) -> list[str]:

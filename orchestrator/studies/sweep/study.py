@@ -143,6 +143,19 @@ class Sample(Section):
         return self
 
 
+class Sensitivity(Section):
+    """How many points the indices of Sobol' are estimated from; each takes two runs, and one for each parameter."""
+
+    count: Annotated[int, Field(ge=8)]
+
+    @model_validator(mode="after")
+    def _balanced(self) -> Self:
+        if self.count & (self.count - 1):
+            low = 2 ** (self.count.bit_length() - 1)
+            raise ValueError(f"count = {self.count} is not a power of two; take {low} or {2 * low}")
+        return self
+
+
 class Study(StudyFile):
     """A sweep, as it is read.
 
@@ -151,6 +164,7 @@ class Study(StudyFile):
     set : values for all runs, by their keys
     vary : of these, every combination is run; the keys ``scenario`` and ``robot`` are names of the catalogue, or paths
     sample : None: nothing is drawn at random
+    sensitivity : None: it is not asked for
     refine : None: what varies has the values that it is given, and no others
     interval, tolerance, estimate : of the monolithic solver, see `Job`
     extremes : signals whose least and largest value are columns of the table; None: those of `EXTREMES` that there are
@@ -164,6 +178,7 @@ class Study(StudyFile):
     set: Settings = Field(default_factory=dict)
     vary: dict[str, Varied] = Field(default_factory=dict)
     sample: Sample | None = None
+    sensitivity: Sensitivity | None = None
     refine: Refine | None = None
     interval: Positive = 0.02
     tolerance: Positive = 1e-5
@@ -197,6 +212,8 @@ class Study(StudyFile):
                     raise ValueError(f"{both[0]} stands in [{other}] and in [{name}]; leave one of them out")
         if named := sorted({"robot", "scenario"} & {*self.set, *sampled}):
             raise ValueError(f"{named[0]} can stand in [vary] alone; a list of one value will do")
+        if self.sensitivity is not None and self.sample is None:
+            raise ValueError("has [sensitivity] without [sample]; say there how its parameters are distributed")
         self._can_be_refined()
         return self
 
