@@ -8,7 +8,7 @@ from itertools import product
 from typing import Any
 
 from orchestrator.studies.sweep.boxes import Edges, Side, areas, divided, middle
-from orchestrator.studies.sweep.design import bare
+from orchestrator.studies.sweep.design import bare, groups
 from orchestrator.studies.sweep.outcome import ALL, Chances, Outcome
 from orchestrator.studies.sweep.ranges import Cell, cell, is_number, unit_of, values_of
 from orchestrator.studies.sweep.refine import kind_of
@@ -114,6 +114,14 @@ class Spot:
         return cell(self.outcomes)
 
 
+def shown(study: Study, outcomes: Sequence[Outcome], keys: Sequence[str]) -> tuple[Study, Sequence[Outcome]]:
+    """Return what a map over `keys` can show: where others vary, too, without runs that were added on one line alone."""
+    if study.refine is None or set(varying(study)) <= set(keys):
+        return study, outcomes
+    grid = len(groups(study))
+    return study.model_copy(update={"refine": None}), [o for o in outcomes if o.row.number <= grid]
+
+
 def axis_of(study: Study, outcomes: Sequence[Outcome], key: str) -> Axis:
     """Return the axis of a key; `InputError` where it does not vary."""
     values = [bare(value) for value in values_of(study, key, outcomes)]
@@ -126,8 +134,8 @@ def spots(study: Study, outcomes: Sequence[Outcome], axes: Sequence[Axis]) -> li
     at: dict[Values, list[Outcome]] = {}
     for outcome in outcomes:
         at.setdefault(tuple(outcome.row.inputs[axis.key] for axis in axes), []).append(outcome)
-    shown = _areas(study, at, axes)
-    return [Spot(place, shown.get(place, []), mine) for place, mine in at.items()]
+    parts = _areas(study, at, axes)
+    return [Spot(place, parts.get(place, []), mine) for place, mine in at.items()]
 
 
 def _areas(study: Study, at: Mapping[Values, Sequence[Outcome]], axes: Sequence[Axis]) -> dict[Values, list[Edges]]:
@@ -136,7 +144,7 @@ def _areas(study: Study, at: Mapping[Values, Sequence[Outcome]], axes: Sequence[
     Where the outline was refined a place stands for its part of the boxes that were divided, on each line by itself.
     """
     refine = study.refine
-    if refine is None or any(key not in [axis.key for axis in axes] for key in refine.widths):
+    if refine is None:
         return {place: [[axis.side(v) for axis, v in zip(axes, place, strict=True)]] for place in at}
     inner = [i for i, axis in enumerate(axes) if axis.key in refine.widths]
     lines: dict[Values, list[Values]] = {}
@@ -169,6 +177,7 @@ def content(found: Swept) -> dict[str, Any]:
     """Return what ``map.json`` holds: over two keys the worst of all runs, then each combination of the others."""
     study, outcomes = found.study, found.outcomes
     keys, likely = varying(study), dict(zip(sorted({o.row.group for o in outcomes}), found.chances, strict=False))
+    slices = _slices(study, outcomes, keys[2:])
     axes = [axis_of(study, outcomes, key) for key in keys[:2]]
     return {
         "format": FORMAT,
@@ -179,20 +188,20 @@ def content(found: Swept) -> dict[str, Any]:
         "axes": [axis.content() for axis in axes],
         "limits": sorted({name for outcome in outcomes for name in outcome.limits}),
         "maps": [
-            {"where": where, "cells": [_cell(spot, likely) for spot in spots(study, mine, axes)]}
-            for where, mine in _slices(study, outcomes, keys[2:])
+            {"where": where, "cells": [_cell(spot, likely) for spot in spots(of, mine, axes)]}
+            for where, (of, mine) in slices
         ],
     }
 
 
 def _slices(
     study: Study, outcomes: Sequence[Outcome], keys: Sequence[str]
-) -> Iterator[tuple[dict[str, Any], list[Outcome]]]:
-    """Yield all outcomes, then those of each combination of `keys`."""
-    yield {}, list(outcomes)
+) -> Iterator[tuple[dict[str, Any], tuple[Study, Sequence[Outcome]]]]:
+    """Yield the study with all outcomes, then with those of each combination of `keys`."""
+    yield {}, shown(study, outcomes, [key for key in varying(study) if key not in keys])
     for chosen in product(*([bare(v) for v in study.values[key]] for key in keys)) if keys else ():
         where = dict(zip(keys, chosen, strict=True))
-        yield where, [o for o in outcomes if all(o.row.inputs[key] == value for key, value in where.items())]
+        yield where, (study, [o for o in outcomes if all(o.row.inputs[key] == value for key, value in where.items())])
 
 
 def _cell(spot: Spot, likely: Mapping[int, Chances]) -> dict[str, Any]:

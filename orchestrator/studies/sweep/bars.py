@@ -32,7 +32,7 @@ def draw(found: Sequence[Sensitivity]) -> Figure | None:
         panels = figure.subplots(len(shown), columns, squeeze=False, sharex=True, sharey=True)
         for line, one in zip(panels, shown, strict=True):
             _row(line, one)
-        figure.supxlabel("Share of the variance")
+        figure.supxlabel("Share of the variance", fontsize=STYLE["axes.labelsize"])
         handles, labels = panels[0, 0].get_legend_handles_labels()
         figure.legend(handles, labels, loc="outside upper right", ncols=2)
         return figure
@@ -61,13 +61,13 @@ def _row(panels: np.ndarray, one: Sensitivity) -> None:
 
 
 def _panel(panel: Axes, of: Mapping[str, Indices]) -> None:
-    """Draw two bars for each parameter: the total index, and on it, narrower, the first one."""
+    """Draw two bars for each parameter: the first index, and below it the total one."""
     at = np.arange(len(of))[::-1]
-    for name, height, colour in (("total", 0.7, SKY), ("first", 0.35, BLUE)):
+    for name, beside, colour in (("first", 0.19, BLUE), ("total", -0.19, SKY)):
         indices = [getattr(one, name) for one in of.values()]
         values = np.array([index.estimate for index in indices])
         spread = np.abs(np.array([index.interval for index in indices]).T - values)
-        panel.barh(at, values, height, color=colour, label=name)
-        panel.errorbar(values, at, xerr=spread, fmt="none", ecolor=BLACK, elinewidth=0.8, capsize=2.0)
+        panel.barh(at + beside, values, 0.36, color=colour, label=name)
+        panel.errorbar(values, at + beside, xerr=spread, fmt="none", ecolor=BLACK, elinewidth=0.8, capsize=2.0)
     panel.set_yticks(at, [name.replace(".parameters.", ".\u200b") for name in of], fontsize=8)
     panel.axvline(0.0, color=BLACK, linewidth=0.8)

@@ -102,7 +102,7 @@ class Refine(Section):
     """
 
     outline: Literal["verdict", "limit"] = "limit"
-    widths: Annotated[dict[str, Positive], Field(min_length=1)]
+    widths: Annotated[dict[str, Positive], Field(min_length=1, max_length=2)]
 
 
 class Sample(Section):
