@@ -17,13 +17,27 @@ export const fixed = (value, digits = 2) => {
   return Number(text) === 0 ? text.replace('-', '') : text.replace('-', '−');   // no −0
 };
 
+// Small drawings are made in memory: where graphics are software, curves sent to "the card" take seconds.
+const IN_MEMORY = { willReadFrequently: true };
+
+// Make something whose canvases are to be drawn in memory, although it does not ask for that itself (uPlot).
+export function inMemory(make) {
+  const prototype = HTMLCanvasElement.prototype, { getContext } = prototype;
+  prototype.getContext = function context(kind, options) { return getContext.call(this, kind, { ...options, ...IN_MEMORY }); };
+  try {
+    return make();
+  } finally {
+    prototype.getContext = getContext;
+  }
+}
+
 // A canvas of as many pixels as its place on the screen has; returns what is needed to draw in CSS pixels.
 export function pixels(canvas) {
   const ratio = Math.min(devicePixelRatio || 1, 2), width = canvas.clientWidth, height = canvas.clientHeight;
   if (!width || !height) return null;
   const [w, h] = [Math.round(width * ratio), Math.round(height * ratio)];
   if (canvas.width !== w || canvas.height !== h) { canvas.width = w; canvas.height = h; }
-  const pen = canvas.getContext('2d');
+  const pen = canvas.getContext('2d', IN_MEMORY);
   pen.setTransform(ratio, 0, 0, ratio, 0, 0);
   pen.clearRect(0, 0, width, height);
   return { pen, width, height };

@@ -1,7 +1,7 @@
 // Plots of the signals: one cursor and one zoom for all, limits as lines, the value at the cursor or at the time shown.
 import uPlot from 'uplot';
 import { axisText, curves, extent, power, powerText, range } from './curves.js';
-import { colour, css, element, fixed, FONT } from './dom.js';
+import { colour, css, element, fixed, FONT, inMemory } from './dom.js';
 import { locate } from './model.js';
 
 const LEAST = 118, MOST = 200, PHONE = 520, LAST = 20;   // px; the last panel carries the axis of time
@@ -74,7 +74,8 @@ export class Plots {
     figure.setAttribute('aria-label', `${content.title}${content.unit ? `, ${content.unit}` : ''}, over time`);
     figure.setAttribute('role', 'group');
     this.body.append(figure);
-    const plot = new uPlot(this.#options(content, isLast), [Array.from(this.model.time), ...content.curves.map(c => c.values)], host);
+    const data = [Array.from(this.model.time), ...content.curves.map(c => c.values)];
+    const plot = inMemory(() => new uPlot(this.#options(content, isLast), data, host));
     const mark = element('div', { className: 'mark' });
     plot.over.append(mark);
     this.#clicks(plot);
@@ -165,10 +166,10 @@ export class Plots {
 
 const seconds = ticks => ticks.map((x, i) => (i === ticks.length - 1 ? `${+x.toFixed(6)} s` : `${+x.toFixed(6)}`));
 
-const DASHES = { own: undefined, reference: [2, 4], other: [8, 4], difference: undefined };
+const DASHES = { own: undefined, reference: [4, 4], other: [8, 4], difference: undefined };
 
 function series({ label, colour: number, dash, kind }) {
-  const style = { own: 1.5, reference: 2, other: 1.2, difference: 1.4 };
+  const style = { own: 1.5, reference: 1.2, other: 1.2, difference: 1.4 };
   return {
     label, stroke: kind === 'reference' ? css('--reference') : colour(number), width: style[kind], points: { show: false },
     dash: DASHES[kind] ?? (Array.isArray(dash) ? dash : dash ? [6, 4] : undefined),

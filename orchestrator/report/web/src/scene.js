@@ -137,7 +137,7 @@ export class View {
   // The reference: a pale robot and line, its difference from the run exaggerated until it can be seen.
   #reference(model) {
     if (!model.hasReference) { this.#replace('ghostRobot', null); this.#replace('ghostLine', null); this.options.reference = 0; return; }
-    this.pale ??= new MeshPhongMaterial({ transparent: true, opacity: 0.35, depthWrite: false, polygonOffset: true, polygonOffsetFactor: 1, polygonOffsetUnits: 4 });
+    this.pale ??= new MeshPhongMaterial({ transparent: true, opacity: 0.35, depthWrite: false });
     const pale = new Proxy({}, { get: () => this.pale });
     if (!this.ghostRobot && model.head.robot) this.#replace('ghostRobot', buildRobot(model.head.robot, pale));
     const nodes = model.line(model.start, `reference/${model.linePrefix}`), radius = (model.head.cable_diameter ?? 0.02) / 2;
