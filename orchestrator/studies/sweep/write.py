@@ -12,11 +12,13 @@ import numpy as np
 from orchestrator.coupling.errors import InputError
 from orchestrator.coupling.run.results import read_json, replacing, write_json
 from orchestrator.runs.directory import circumstances
+from orchestrator.studies.sweep import atlas
 from orchestrator.studies.sweep.outcome import cells
+from orchestrator.studies.sweep.sensitivity import Index
 from orchestrator.studies.sweep.solve import Swept, describe
 from orchestrator.studies.sweep.study import Study
 
-STORE, TABLE, RESULT = "runs", "table.csv", "study.json"
+STORE, TABLE, MAP, RESULT = atlas.STORE, "table.csv", "map.json", "study.json"
 ALWAYS = ("safe", "least_margin")
 """Columns that are there even where nothing is judged."""
 Columns = dict[str, np.ndarray]
@@ -48,9 +50,10 @@ def _require_same(folder: Path, study: Study) -> None:
 
 
 def save(folder: Path, found: Swept) -> None:
-    """Write the table, then ``study.json``: what is complete has both."""
+    """Write table and maps, then ``study.json``: what is complete has all."""
     rows = [cells(found.study, outcome) for outcome in found.outcomes]
     write_rows(folder / TABLE, rows)
+    write_json(folder / MAP, atlas.content(found))
     write_json(folder / RESULT, {**describe(found), **circumstances()})
 
 
@@ -128,3 +131,20 @@ def chance_rows(found: Swept) -> Iterator[tuple[str, ...]]:
             estimate = least if least == most else f"{least} to {most}"
             interval = f"{p.interval[0]:.4f} to {p.interval[1]:.4f}"
             yield where, name, str(p.count), estimate, interval, str(p.unknown or "")
+
+
+INDICES = ("where", "margin", "parameter", "first", "95 % interval", "total", "95 % interval")
+
+
+def index_rows(found: Swept) -> Iterator[tuple[str, ...]]:
+    """Yield a row for each parameter that a margin hangs on, under `INDICES`."""
+    for one in found.sensitivities:
+        where = ", ".join(f"{key} {value}" for key, value in one.where.items())
+        for name in (name for name in one.of if "margin" in name):
+            for parameter, both in one.of[name].items():
+                texts = (t for index in (both.first, both.total) for t in _index(index))
+                yield where, name.removeprefix("margin."), parameter, *texts
+
+
+def _index(index: Index) -> tuple[str, str]:
+    return f"{index.estimate:.3f}", f"{index.interval[0]:.3f} to {index.interval[1]:.3f}"
