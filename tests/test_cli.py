@@ -239,7 +239,10 @@ def test_a_landing_leaves_shape_and_tension(landing_run):
     n, m = fields["tension"].shape
     assert fields["position"].shape == (n, m, 3) and n == len(table["time"]) == 11
     assert np.allclose(fields["position"][:, [0, -1], 2], 0.0, atol=1e-9)  # supports do not move
-    assert not any("_mean" in name or "shape[" in name or "port[2]" in name for name in table)
+    assert not any("_mean" in name or "shape[" in name or "node[" in name or "port[2]" in name for name in table)
+    m = fields["node_arc_length"].size
+    assert fields["node_position"].shape == fields["node_slope"].shape == (n, m, 3) and 2 < m <= 64
+    assert np.allclose(fields["node_position"][:, [0, -1]], fields["position"][:, [0, -1]], rtol=0.0, atol=1e-12)
     assert (out / "plots" / "shapes.png").is_file()
 
 

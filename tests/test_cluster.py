@@ -7,7 +7,7 @@ import pytest
 
 from orchestrator.coupling.errors import InputError
 from orchestrator.runs import cluster
-from orchestrator.runs.batch import Batches
+from orchestrator.runs.batch import Batches, make_elsewhere
 from orchestrator.runs.job import Job, code_version
 from orchestrator.studies.sweep import solve, write
 from orchestrator.studies.sweep.study import load_study
@@ -38,10 +38,10 @@ def swept(study, folder: Path, dask: str | None = None):
 
 def test_a_cluster_of_another_kind_is_said():
     job = Job("oscillator", {"simulation.stop_time": 0.1}, solver="coupled")
-    assert "another version" in cluster.make_elsewhere(job, job.key, "other", None)[1]
-    assert "other files under the same paths" in cluster.make_elsewhere(job, "other", code_version(), None)[1]
+    assert "another version" in make_elsewhere(job, job.key, "other", None)[1]
+    assert "other files under the same paths" in make_elsewhere(job, "other", code_version(), None)[1]
     missing = Job("nowhere.toml", solver="coupled")
-    assert "no such" in cluster.make_elsewhere(missing, "other", code_version(), None)[1]
+    assert "no such" in make_elsewhere(missing, "other", code_version(), None)[1]
 
 
 def test_where_there_is_no_scheduler_nothing_is_touched(tmp_path: Path, monkeypatch: pytest.MonkeyPatch):

@@ -188,3 +188,8 @@ def _longest_element(fine: np.ndarray, distance: np.ndarray, n_elements: int, gr
         else:
             high = middle
     return float(high)
+
+
+def spread(count: int, most: int) -> np.ndarray:
+    """Return which (m,) of `count` nodes are shown, ascending: all, or `most` of them, both ends included."""
+    return np.unique(np.round(np.linspace(0, count - 1, min(count, most))).astype(int))

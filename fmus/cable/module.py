@@ -9,7 +9,7 @@ import numpy as np
 from fmus.cable import dynamics, ports
 from fmus.cable.assembly import Model, interpolate
 from fmus.cable.diagnosis import diagnose
-from fmus.cable.mesh import MOST, TOLERANCE, Line, automatic, nodes
+from fmus.cable.mesh import MOST, TOLERANCE, Line, automatic, nodes, spread
 from fmus.cable.state import N_PORTS, NOT_FINITE, OFF_CABLE, OK, factorise_mass, make_work, state_size
 from fmus.cable.statics import catenary, equilibrium, mesh_model
 from fmus.kernels.roots import root
@@ -28,6 +28,8 @@ from fmus.module.variables import (
 
 N_SHAPE = 41
 """Points at which the shape of the cable is shown, equally spaced in unstretched arc length."""
+N_NODES = 64
+"""Nodes that are shown, with their slopes: all of a mesh that has no more, else as many of them, spread evenly."""
 N_CATENARY = 401
 """Points of the catenary on which landing points are found: to 1e-5 of the length, a mesh asks for no more."""
 REMEMBERED = 16
@@ -186,6 +188,9 @@ def _table() -> VariableTable:
                 "tension there: force of the cross-section along the tangent",
             )
         )
+    for i in range(N_NODES):
+        rows += vector(f"node[{i + 1}].position", "output", "m", "a node; the last one again where the mesh has fewer")
+        rows += vector(f"node[{i + 1}].slope", "output", "1", "dr/ds there: the centreline is cubic between nodes")
     return VariableTable(rows)
 
 
@@ -202,6 +207,7 @@ class Cable:
         self._ports = self._rows("port[1].s", N_PORTS, ports.N_INPUTS)
         self._shown_ports = self._rows("port[1].position.x", N_PORTS, ports.N_SHOWN)
         self._shape = self._rows("shape[1].position.x", N_SHAPE, 4)
+        self._nodes_shown = self._rows("node[1].position.x", N_NODES, 6)
         self._shown = self._rows("tension_left", 1, len(_OUTPUTS))[0]
 
     def _rows(self, first: str, n: int, width: int) -> np.ndarray:
@@ -227,6 +233,8 @@ class Cable:
         self._alpha = generalized_alpha(self["spectral_radius"])
         self._use_alpha = self["integrator"] == 1.0
         self._work = make_work(n, self.state.size)
+        shown = spread(self.model.s.size, N_NODES)
+        self._nodes_at = np.pad(shown, (0, N_NODES - shown.size), mode="edge")
         factorise_mass(self.model, q, self._work)
         self.refresh()
         self._diagnose(np.zeros_like(self._ports))  # at rest, before any load
@@ -328,6 +336,7 @@ class Cable:
         )
         if status != OK:
             raise ModuleError(self._failure(status, t, h))
+        self._show_nodes()
 
     def _failure(self, status: int, t: float, h: float) -> str:
         """Return what to say of a step that was not made."""
@@ -367,6 +376,11 @@ class Cable:
             self._shape,
             self._work,
         )
+        self._show_nodes()
+
+    def _show_nodes(self) -> None:
+        """Write position and slope of the nodes that are shown."""
+        self._nodes_shown[:] = self.state[: self.model.weight.size].reshape(-1, 6)[self._nodes_at]
 
 
 @lru_cache(maxsize=REMEMBERED)

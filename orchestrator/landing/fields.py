@@ -2,38 +2,55 @@
 
 from __future__ import annotations
 
-from collections.abc import Mapping
+from collections.abc import Mapping, Sequence
 
 import numpy as np
 
-from fmus.cable.module import N_SHAPE
+from fmus.cable.mesh import spread
+from fmus.cable.module import N_NODES, N_SHAPE
 
 
-def cable_fields(table: Mapping[str, np.ndarray], length: float) -> dict[str, np.ndarray]:
+def cable_fields(
+    table: Mapping[str, np.ndarray], length: float, nodes: np.ndarray | None = None
+) -> dict[str, np.ndarray]:
     """Return shape and tension of the cable over time from its signals; empty if it does not show them.
 
     Parameters
     ----------
     table : signals over time
     length : unstretched length of the cable, m
+    nodes : (k,) arc lengths of its mesh's nodes, m; None of a foreign cable
 
     Returns
     -------
-    time (n,) s, arc_length (m,) m, position (n, m, 3) m, tension (n, m) N
+    time (n,) s, arc_length (m,) m, position (n, m, 3) m, tension (n, m) N; of our own cable also node_arc_length (j,) m,
+    node_position (n, j, 3) m and node_slope (n, j, 3), dr/ds: the line is cubic between the nodes (Hermite)
     """
     if "cable.shape[1].position.x" not in table:
         return {}
-    points = range(1, N_SHAPE + 1)
-    position = np.stack(
-        [np.stack([table[f"cable.shape[{i}].position.{axis}"] for axis in "xyz"], axis=-1) for i in points], axis=1
-    )
-    tension = np.stack([table[f"cable.shape[{i}].tension"] for i in points], axis=1)
+    shape = [f"cable.shape[{i}]" for i in range(1, N_SHAPE + 1)]
     return {
         "time": np.asarray(table["time"]),
         "arc_length": np.linspace(0.0, length, N_SHAPE),
-        "position": position,
-        "tension": tension,
+        "position": _vectors(table, [f"{point}.position" for point in shape]),
+        "tension": np.stack([table[f"{point}.tension"] for point in shape], axis=1),
+        **(_nodes(table, nodes) if nodes is not None and "cable.node[1].slope.x" in table else {}),
     }
+
+
+def _nodes(table: Mapping[str, np.ndarray], nodes: np.ndarray) -> dict[str, np.ndarray]:
+    shown = nodes[spread(nodes.size, N_NODES)]
+    names = [f"cable.node[{i}]" for i in range(1, shown.size + 1)]
+    return {
+        "node_arc_length": shown,
+        "node_position": _vectors(table, [f"{name}.position" for name in names]),
+        "node_slope": _vectors(table, [f"{name}.slope" for name in names]),
+    }
+
+
+def _vectors(table: Mapping[str, np.ndarray], names: Sequence[str]) -> np.ndarray:
+    """Return vectors over time (n, len(names), 3)."""
+    return np.stack([np.stack([table[f"{name}.{axis}"] for axis in "xyz"], axis=-1) for name in names], axis=1)
 
 
 def interface_balance(table: Mapping[str, np.ndarray], booked: Mapping[str, np.ndarray]) -> dict[str, dict[str, float]]:

@@ -8,11 +8,15 @@ from __future__ import annotations
 
 import errno
 import os
+import shutil
+import tempfile
+import threading
 from collections.abc import Callable, Iterable, Iterator, Mapping, Sequence
 from concurrent.futures import Future, as_completed
 from concurrent.futures import TimeoutError as RanTooLong
 from concurrent.futures.process import BrokenProcessPool
 from contextlib import ExitStack
+from multiprocessing import current_process
 from pathlib import Path
 from typing import TYPE_CHECKING, Any, Self
 
@@ -22,7 +26,7 @@ from fmus.face.first_use import compile_modules
 from fmus.kernels.jit import is_compiled
 from orchestrator.coupling.errors import InputError
 from orchestrator.runs import cluster, worker
-from orchestrator.runs.job import Done, Job, found, make, remove_half_done
+from orchestrator.runs.job import Done, Job, code_version, found, make, remove_half_done
 from orchestrator.scenario.types import LandingScenario
 
 if TYPE_CHECKING:
@@ -140,7 +144,7 @@ class Batches:
         if not left:
             return
         if self._client is not None:
-            yield from cluster.ended(self._client, left, self.store, limit)
+            yield from cluster.ended(self._client, make_elsewhere, left, self.store, limit)
             return
         pool = self._started(solvers)
         futures: dict[Future[None], str] = {
@@ -219,3 +223,43 @@ def _failure(error: BaseException | None) -> str | None:
 def _lost(store: Path, key: str) -> Path:
     """Return the file that says why a run has left nothing."""
     return store / f"{key}.failed"
+
+
+# -- in a Dask worker -------------------------------------------------------------------------------------------
+
+
+_here = threading.local()
+"""Of a thread of a Dask worker: its child, which is kept from run to run."""
+
+
+def make_elsewhere(job: Job, key: str, version: str, limit: float | None) -> tuple[cluster.Packed | None, str]:
+    """Make a run in a child of this process; return its folder, or why it has left nothing."""
+    if version != code_version():
+        return (
+            None,
+            "the cluster's worker has another version of this program, or of its libraries; install the same there",
+        )
+    try:
+        if job.key != key:
+            return None, f"{job.scenario}: the cluster's worker has other files under the same paths; share a folder"
+    except InputError as error:
+        return None, f"on the cluster's worker: {error}"
+    batches = _batches()
+    batches.timeout = limit
+    (done,) = batches.run([job])
+    if done.directory is None:
+        return None, str(done.failure)
+    packed = {file.name: file.read_bytes() for file in done.directory.iterdir()}
+    shutil.rmtree(done.directory)
+    return packed, ""
+
+
+def _batches() -> Batches:
+    """Return what makes runs in a child of this thread."""
+    if not hasattr(_here, "batches"):
+        current_process().daemon = (
+            False  # Dask's workers are daemons, which may have no children; this one ends with it
+        )
+        _here.folder = tempfile.TemporaryDirectory(prefix="line-landing-")
+        _here.batches = Batches(Path(_here.folder.name), 1)
+    return _here.batches

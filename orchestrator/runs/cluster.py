@@ -6,14 +6,10 @@ same version; what a scenario names by its path (an own scenario, robot, FMU) ha
 
 from __future__ import annotations
 
-import shutil
-import tempfile
-import threading
-from collections.abc import Iterator, Mapping
+from collections.abc import Callable, Iterator, Mapping
 from concurrent.futures import Future
 from contextlib import contextmanager
 from dataclasses import fields
-from multiprocessing import current_process
 from pathlib import Path
 from typing import TYPE_CHECKING, Any
 
@@ -23,14 +19,12 @@ from orchestrator.runs.job import Job, code_version, put
 if TYPE_CHECKING:
     from distributed import Client
 
-    from orchestrator.runs.batch import Batches
-
 PATIENCE = "20 s"
 """For a scheduler to answer."""
 Packed = dict[str, bytes]
 """The files of a finished run."""
-_here = threading.local()
-"""Of a thread of a Dask worker: its child, which is kept from run to run."""
+Made = Callable[[Job, str, str, float | None], tuple[Packed | None, str]]
+"""Makes a run known by a key, with the version of the program and a time limit; returns its files, or why there are none."""
 
 
 class LostError(Exception):
@@ -55,16 +49,14 @@ def connected(address: str) -> Iterator[Client]:
 
 
 def ended(
-    client: Client, left: Mapping[str, Job], store: Path, limit: float | None
+    client: Client, make: Made, left: Mapping[str, Job], store: Path, limit: float | None
 ) -> Iterator[tuple[str, Future[None]]]:
-    """Yield each run as it has ended, its results in `store`."""
+    """Yield each run as it has ended, its results in `store`; `make` is what a worker does with each."""
     from distributed import as_completed
 
     store.mkdir(parents=True, exist_ok=True)
     version = code_version()
-    futures = {
-        client.submit(make_elsewhere, _bare(job), key, version, limit, pure=False): key for key, job in left.items()
-    }
+    futures = {client.submit(make, _bare(job), key, version, limit, pure=False): key for key, job in left.items()}
     try:
         for future in as_completed(futures):
             yield futures[future], _stored(future, futures[future], store)
@@ -92,41 +84,3 @@ def _stored(future: Any, key: str, store: Path) -> Future[None]:
                 (directory.path / name).write_bytes(content)
         known.set_result(None)
     return known
-
-
-# -- in a Dask worker -------------------------------------------------------------------------------------------
-
-
-def make_elsewhere(job: Job, key: str, version: str, limit: float | None) -> tuple[Packed | None, str]:
-    """Make a run in a child of this process; return its folder, or why it has left nothing."""
-    if version != code_version():
-        return (
-            None,
-            "the cluster's worker has another version of this program, or of its libraries; install the same there",
-        )
-    try:
-        if job.key != key:
-            return None, f"{job.scenario}: the cluster's worker has other files under the same paths; share a folder"
-    except InputError as error:
-        return None, f"on the cluster's worker: {error}"
-    batches = _batches()
-    batches.timeout = limit
-    (done,) = batches.run([job])
-    if done.directory is None:
-        return None, str(done.failure)
-    packed = {file.name: file.read_bytes() for file in done.directory.iterdir()}
-    shutil.rmtree(done.directory)
-    return packed, ""
-
-
-def _batches() -> Batches:
-    """Return what makes runs in a child of this thread."""
-    from orchestrator.runs.batch import Batches
-
-    if not hasattr(_here, "batches"):
-        current_process().daemon = (
-            False  # Dask's workers are daemons, which may have no children; this one ends with it
-        )
-        _here.folder = tempfile.TemporaryDirectory(prefix="line-landing-")
-        _here.batches = Batches(Path(_here.folder.name), 1)
-    return _here.batches

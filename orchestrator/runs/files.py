@@ -18,7 +18,10 @@ from orchestrator.runs.compare import Comparison
 from orchestrator.runs.directory import RunDirectory
 from orchestrator.runs.result import Run
 
-FIELD_UNITS = {"time": "s", "arc_length": "m", "position": "m", "tension": "N"}
+FIELD_UNITS = {
+    "time": "s", "arc_length": "m", "position": "m", "tension": "N",
+    "node_arc_length": "m", "node_position": "m", "node_slope": "1",
+}  # fmt: skip
 COUNTS = {"iterations": int, "subdivisions": int, "rejected": int, "columns": int, "converged": bool}
 """Columns of ``iterations.csv`` that are no real numbers."""
 Draw = Callable[[Path], object]

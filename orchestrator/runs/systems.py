@@ -173,8 +173,9 @@ class LandingSystem:
 
     def split(self, table: Table) -> tuple[Fields, Table]:
         """Return the cable's shape and tension over time as arrays, and the table without them."""
-        rest = {name: values for name, values in table.items() if not name.startswith("cable.shape[")}
-        return cable_fields(table, self.landing.placement.cable_length), rest
+        rest = {name: values for name, values in table.items() if not name.startswith(("cable.shape[", "cable.node["))}
+        nodes = self.landing.mesh.nodes if self.landing.mesh is not None else None
+        return cable_fields(table, self.landing.placement.cable_length, nodes), rest
 
     def about(self, table: Table) -> dict[str, Any]:
         """Return stiffness set and robot, and which signals an energy audit would need."""
