@@ -20,7 +20,7 @@ NO_WEBGL = """const real = HTMLCanvasElement.prototype.getContext;
 HTMLCanvasElement.prototype.getContext = function (kind, ...rest) {
   return /webgl/.test(kind) ? null : real.call(this, kind, ...rest);
 };"""
-LIMIT = 60.0
+LIMIT = 120.0
 """s that a page may take for anything, on a machine that has much else to do."""
 
 
@@ -96,6 +96,7 @@ def opened(browser: Any, path: Path, webgl: bool = True, **context: Any) -> Open
     place = browser.new_context(**{"viewport": {"width": 1100, "height": 750}, **context})
     if not webgl:
         place.add_init_script(NO_WEBGL)
+    place.set_default_timeout(1e3 * LIMIT)
     found = Opened(place.new_page())
     found.page.on("console", lambda said: found.said.append(f"{said.type}: {said.text}"))
     found.page.on("pageerror", lambda error: found.said.append(f"error: {error}"))

@@ -1,6 +1,7 @@
 """The page of a run: what stands in its one file, held against the directory that it was made from."""
 
 import base64
+import gzip
 import hashlib
 import json
 import re
@@ -13,16 +14,16 @@ from typing import Any
 import numpy as np
 import pytest
 
-from orchestrator.coupling.run.results import read_json
+from orchestrator.coupling.run.results import read_json, read_table, write_json
 from orchestrator.landing import workspace
-from orchestrator.report.page import line, write
+from orchestrator.report.page import line, report, write, write_sweep
 from orchestrator.report.page.blob import Place, pack, unpack
 from orchestrator.report.page.data import Source, pack_within
 from orchestrator.report.page.gap import gap_of
 from orchestrator.runs.directory import RunDirectory
 from orchestrator.runs.files import write_comparison, write_run
 from orchestrator.runs.result import Run
-from tests.made_up import TIME, compared_to, geometry, landing, made_up, on_a_line
+from tests.made_up import TIME, compared_to, geometry, landing, made_up, on_a_line, swept
 
 TEMPLATE = """<!doctype html><html lang="en"><head><meta http-equiv="Content-Security-Policy" content="@@CSP@@">
 <title>@@TITLE@@</title><style>@@STYLE@@</style></head><body>@@BODY@@<pre>@@LICENCES@@</pre>
@@ -302,3 +303,76 @@ def test_packed_arrays_come_back():
 def test_a_run_of_one_point_has_a_page(tmp_path: Path, web: Path):
     run = made_up({name: values[:1] for name, values in landing().items()})
     assert written(tmp_path / "run", run, web).arrays["time"].shape == (1,)
+
+
+# -- what if ------------------------------------------------------------------------------------------------------
+
+
+def left_starts(folder: Path, kernels: str, first: float = 0.0) -> None:
+    """What a run leaves to be solved anew: two starts of two words each."""
+    words = first + np.arange(4.0)
+    (folder / "start.bin").write_bytes(words.astype("<f8").tobytes())
+    starts = [{"first": 2 * k, "given": 2, "robot": "made_up", "geometry": geometry(1)} for k in range(2)]
+    about = {"format": 1, "reason": None, "kernels": kernels, "end": 2.0, "starts": starts}
+    write_json(folder / "start.json", about)
+
+
+def with_solver(web: Path, kernels: str) -> Path:
+    (web / "landing.wasm").write_bytes(b"a module")
+    write_json(web / "landing.json", {"kernels": kernels})
+    return web
+
+
+def test_starts_are_embedded_with_the_solver_that_they_fit(tmp_path: Path, web: Path):
+    folder = tmp_path / "run"
+    write_run(RunDirectory(folder), on_a_line())
+    left_starts(folder, "abc")
+    page = Page(text_of(folder, with_solver(web, "abc")))
+    about = page.head["whatif"]
+    assert np.array_equal(page.arrays["whatif.starts"], np.arange(4.0)) and about["reason"] is None
+    assert gzip.decompress(base64.b64decode(page.texts["wasm"])) == b"a module"
+    assert about["starts"][1]["scene"]["robot"]["name"] == "made_up" and "geometry" not in about["starts"][0]
+
+
+@pytest.mark.parametrize("built", ["other", "", None])
+def test_without_the_right_solver_there_are_no_sliders_and_it_says_why(tmp_path: Path, web: Path, built: str | None):
+    folder = tmp_path / "run"
+    write_run(RunDirectory(folder), on_a_line())
+    if built is not None:
+        left_starts(folder, "abc")
+    page = Page(text_of(folder, with_solver(web, built) if built else web))
+    assert "whatif.starts" not in page.arrays and page.texts.get("wasm", "") == ""
+    about = page.head["whatif"]
+    words = {"other": "another version", "": "was not built"}
+    assert about is None if built is None else (about["starts"] == [] and words[built] in about["reason"])
+
+
+# -- a sweep ------------------------------------------------------------------------------------------------------
+
+
+def test_a_sweep_has_its_map_its_runs_and_the_recorded_landings(tmp_path: Path, web: Path):
+    folder = swept(tmp_path / "sweep")
+    left_starts(folder / "runs" / "run3", "abc", first=10.0)
+    page = Page(write_sweep(folder, with_solver(web, "abc")).read_text(encoding="utf-8"))
+    head, arrays = page.head, page.arrays
+    assert head["kind"] == "sweep" and head["verdict"]["word"] == "3 of 4 landings are safe"
+    shown = head["map"]
+    assert (shown["x"]["values"], shown["y"]["values"]) == ([20.0, 60.0], [38.0, 80.0])
+    assert [(c["x"], c["y"], c["verdict"]) for c in shown["cells"]][-1] == (1, 1, "unsafe")
+    assert shown["cells"][3]["margin"] < 0.0 and "not safe; least margin" in shown["cells"][3]["text"]
+    assert set(head["landings"]) == {"run-1", "run-2", "run-4"}, "what was recorded can be opened"
+    run = read_table(folder / "runs" / "run4" / "results.csv")
+    assert np.array_equal(arrays["run-4/robot.roll"], run["robot.roll"].astype(np.float32))
+    assert head["landings"]["run-4"]["head"]["landing_position"] == 60.0
+    start = head["whatif"]["cells"]["run-3"]
+    assert arrays["whatif.starts"][start["first"] : start["first"] + start["given"]].tolist() == [10.0, 11.0]
+    assert "table.csv has all columns" in write_sweep(folder, web).read_text(encoding="utf-8")
+
+
+def test_a_sweep_that_was_interrupted_says_so(tmp_path: Path, web: Path):
+    folder = swept(tmp_path / "sweep")
+    study = read_json(folder / "study.json")
+    write_json(folder / "study.json", study | {"complete": False})
+    assert "the same command goes on" in write_sweep(folder, web).read_text(encoding="utf-8")
+    (folder / "map.json").unlink()
+    assert Page(report(folder, web).read_text(encoding="utf-8")).head["map"] is None

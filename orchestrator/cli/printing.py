@@ -33,11 +33,14 @@ COLOURS = {
 
 def print_run(run: Run) -> None:
     """Print the extremes of the main signals, the cost, the estimated error and the drift of the energy."""
+    from orchestrator.landing.line_state import rest_words
     from orchestrator.report.signals import extremes, in_the_air
 
     summary = run.summary
     for note in run.wiring:
         complain(note)
+    if summary.get("line"):
+        print(rest_words(summary["line"]))
     rows = extremes(run.table, run.tolerances, summary["units"])
     print_table(("signal", "unit", "start", "min", "max", "end"), rows)
     print(

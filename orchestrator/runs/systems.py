@@ -183,9 +183,9 @@ class LandingSystem:
         robot = self.scenario.robot
         energy = {"verdict": None, "missing": audit.missing(table)}
         mesh = self.landing.mesh.content() if self.landing.mesh is not None else None
-        set_name = self.scenario.cable.stiffness_set
-        about = {"stiffness_set": set_name, "robot": robot.model or robot.fmu, "mesh": mesh, "energy": energy}
-        return about | {"geometry": geometry(self.landing)}
+        rest = self.landing.rest.content() if self.landing.rest is not None else None
+        names = {"stiffness_set": self.scenario.cable.stiffness_set, "robot": robot.model or robot.fmu}
+        return {**names, "line": rest, "mesh": mesh, "energy": energy, "geometry": geometry(self.landing)}
 
     def warnings(self, table: Table) -> list[str]:
         """Return which wheels are where the mesh does not resolve what they do, a line each."""
@@ -303,7 +303,7 @@ class GraphSystem:
 
     def about(self, table: Table) -> dict[str, Any]:
         """Return nothing that only a landing has."""
-        return {"stiffness_set": None, "robot": None, "mesh": None, "energy": {}, "geometry": None}
+        return {"stiffness_set": None, "robot": None, "line": None, "mesh": None, "energy": {}, "geometry": None}
 
     def warnings(self, table: Table) -> list[str]:
         """Return nothing: what a run of a general graph should not do is not known."""

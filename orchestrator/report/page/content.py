@@ -61,6 +61,7 @@ def _of_runs(first: Run, others: Sequence[Run], manifest: Manifest, whatif: What
     head = _head(_kind(first), first, manifest, data, plots)
     shown = [_shown(first, ""), *(_shown(run, f"{run.label}/") for run in others)] if others else []
     lower = [_runs_card([first, *others]) if others else Html(), *_lower(first, manifest), *_of_each(others)]
+    lower.append(tables.parameters(manifest, first.summary))
     return Content(replace(head, runs=shown), data, Body(_top(first, manifest, data), _more(lower)))
 
 
@@ -77,6 +78,7 @@ def _of_comparison(found: Comparison, manifest: Manifest, whatif: WhatIf, most: 
     )
     lower = [_comparison_card(found), _runs_card(found.results)]
     lower += [*_lower(first, manifest), tables.limits(reference.safety, "reference"), *_of_each(others)]
+    lower.append(tables.parameters(manifest, first.summary))
     return Content(head, data, Body(_comparison_top(found, first, manifest, data), _more(lower)))
 
 
@@ -190,7 +192,6 @@ def _lower(run: Run, manifest: Manifest) -> Iterator[Html]:
     yield tables.numerics(summary)
     yield tables.said_of(run, summary)
     yield tables.provenance(manifest)
-    yield tables.parameters(manifest, summary)
 
 
 def _of_each(runs: Sequence[Run]) -> Iterator[Html]:
@@ -215,7 +216,10 @@ def _comparison_card(found: Comparison) -> Html:
             check.master,
             f"{1e3 * check.macro_step:g} ms",
             check.signal,
-            *("–" if share is None else f"{share:.2e}" for share in (check.coupling, check.mesh, check.error)),
+            *(
+                "–" if share is None else tables.exponent(share, 2)
+                for share in (check.coupling, check.mesh, check.error)
+            ),
             f"{check.tolerance:g}",
             verdict_word(check.passed, check.note),
         )

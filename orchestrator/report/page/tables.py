@@ -118,12 +118,17 @@ def errors(run: Run, reference: Mapping[str, Parts] | None = None) -> Html:
 
 def _error_row(name: str, parts: Parts, scale: float, run: Run) -> tuple[str, ...]:
     shares = [None if part is None else part / scale for part in (*parts.by_part.values(), parts.total)]
-    cells = ["–" if share is None else "?" if np.isnan(share) else f"{share:.1e}" for share in shares]
+    cells = ["–" if share is None else "?" if np.isnan(share) else exponent(share) for share in shares]
     tolerance = run.tolerances.get(name)
     if tolerance is None:
         return name, *cells, "", ""
     known = "within" if parts.total <= tolerance * scale else "missed"
     return name, *cells, f"{tolerance:g}", "not known" if np.isnan(parts.total) else known
+
+
+def exponent(share: float, digits: int = 1) -> str:
+    """Return a small number as 5.0e−05, with a minus at which no line is broken."""
+    return f"{share:.{digits}e}".replace("-", "−")
 
 
 NUMERICS = {
