@@ -8,15 +8,22 @@ import { printable } from './print.js';
 import { Stage } from './stage.js';
 import { Tiles } from './tiles.js';
 
-const LONGEST_FRAME = 0.25;   // s; a page that was hidden goes on where it stood
-const NUDGE = 0.05;           // s, of the arrow keys
+const LONGEST_FRAME = 0.25; // s; a page that was hidden goes on where it stood
+const NUDGE = 0.05; // s, of the arrow keys
 
 export class App {
-  #parts = []; #pending = false; #then = 0;
+  #parts = [];
+  #pending = false;
+  #then = 0;
 
   constructor(model, page) {
-    this.original = model; this.model = model; this.page = page;
-    this.t = model.start; this.speed = 1; this.playing = false; this.note = '';
+    this.original = model;
+    this.model = model;
+    this.page = page;
+    this.t = model.start;
+    this.speed = 1;
+    this.playing = false;
+    this.note = '';
     this.has = { replay: Boolean(model.head.line || model.head.robot) && model.time.length > 0 };
   }
 
@@ -32,19 +39,27 @@ export class App {
     this.#listen();
     this.#expose();
     this.show(this.original);
-    await new Promise(done => requestAnimationFrame(now => { this.#frame(now); done(); }));
+    await new Promise(done =>
+      requestAnimationFrame(now => {
+        this.#frame(now);
+        done();
+      }),
+    );
   }
 
   // Where scripts draw: the body's own places, made where it has none. A graph has plots alone.
   #places() {
-    const found = id => document.getElementById(id), main = document.getElementById('page');
-    const make = (id, parent) => found(id) ?? parent.appendChild(Object.assign(document.createElement('section'), { id, className: 'card' }));
+    const found = id => document.getElementById(id),
+      main = document.getElementById('page');
+    const make = (id, parent) =>
+      found(id) ?? parent.appendChild(Object.assign(document.createElement('section'), { id, className: 'card' }));
     const work = document.querySelector('.work') ?? document.createElement('div');
     if (!work.isConnected) {
       work.className = 'work';
       (document.querySelector('.tiles') ?? main.querySelector('header') ?? main.firstElementChild).after(work);
     }
-    const stage = make('stage', work), plots = make('plots', work);
+    const stage = make('stage', work),
+      plots = make('plots', work);
     this.places = { work, stage, plots };
     return { stage, plots, map: this.model.head.map ? make('map', main) : found('map') };
   }
@@ -73,7 +88,8 @@ export class App {
 
   // Show another model everywhere: a what-if, or a landing of the map. `note` says what it is; none: the original.
   show(model, note = '') {
-    this.model = model; this.note = note;
+    this.model = model;
+    this.note = note;
     this.has.replay = Boolean(model.head.line || model.head.robot) && model.time.length > 0;
     this.t = Math.min(Math.max(this.t, model.start), model.end);
     const { work, stage, plots } = this.places;
@@ -99,7 +115,9 @@ export class App {
     this.invalidate();
   }
 
-  view(name) { this.stage?.view(name); }
+  view(name) {
+    this.stage?.view(name);
+  }
 
   // Open a landing of the map: its recorded signals where the page has them, else `solver` (what-if) solves it here.
   async open(cell) {
@@ -113,7 +131,8 @@ export class App {
   }
 
   theme(name) {
-    if (name) document.documentElement.dataset.theme = name; else delete document.documentElement.dataset.theme;
+    if (name) document.documentElement.dataset.theme = name;
+    else delete document.documentElement.dataset.theme;
     this.#tell('theme');
     this.invalidate();
   }
@@ -142,16 +161,23 @@ export class App {
 
   draw() {
     this.#tell('at', this.t, this.model);
-    this.page.time = this.t; this.page.frames++;
+    this.page.time = this.t;
+    this.page.frames++;
   }
 
   #listen() {
     addEventListener('keydown', event => this.#key(event));
     document.addEventListener('click', event => {
       const button = event.target.closest?.('[data-seek]');
-      if (button) { this.play(false); this.seek(Number(button.dataset.seek)); }
+      if (button) {
+        this.play(false);
+        this.seek(Number(button.dataset.seek));
+      }
     });
-    matchMedia('(prefers-color-scheme: dark)').addEventListener('change', () => { this.#tell('theme'); this.invalidate(); });
+    matchMedia('(prefers-color-scheme: dark)').addEventListener('change', () => {
+      this.#tell('theme');
+      this.invalidate();
+    });
     this.#themeButton();
     printable(this);
   }
@@ -163,15 +189,29 @@ export class App {
     if (event.key === ' ' && /^(BUTTON|SUMMARY|A)$/.test(tag)) return;
     if (event.defaultPrevented || event.target.closest?.('[data-own-keys]')) return;
     const act = {
-      ' ': () => this.play(!this.playing), ArrowRight: () => this.seek(this.t + NUDGE),
-      ArrowLeft: () => this.seek(this.t - NUDGE), Home: () => this.seek(this.model.start), End: () => this.seek(this.model.end),
-      1: () => this.view('landing'), 2: () => this.view('side'), 3: () => this.view('wheel'), 4: () => this.view('span'),
+      ' ': () => this.play(!this.playing),
+      ArrowRight: () => this.seek(this.t + NUDGE),
+      ArrowLeft: () => this.seek(this.t - NUDGE),
+      Home: () => this.seek(this.model.start),
+      End: () => this.seek(this.model.end),
+      1: () => this.view('landing'),
+      2: () => this.view('side'),
+      3: () => this.view('wheel'),
+      4: () => this.view('span'),
     }[event.key];
-    if (act) { act(); event.preventDefault(); }
+    if (act) {
+      act();
+      event.preventDefault();
+    }
   }
 
   #themeButton() {
-    const button = Object.assign(document.createElement('button'), { type: 'button', id: 'theme', textContent: '◐', title: 'Light or dark' });
+    const button = Object.assign(document.createElement('button'), {
+      type: 'button',
+      id: 'theme',
+      textContent: '◐',
+      title: 'Light or dark',
+    });
     button.setAttribute('aria-label', 'Light or dark');
     (document.querySelector('header') ?? document.getElementById('page')).append(button);
     button.onclick = () => this.theme(isDark() ? 'light' : 'dark');
@@ -180,9 +220,14 @@ export class App {
   // What tests, and people at the console, may use.
   #expose() {
     Object.assign(this.page, {
-      seek: t => this.seek(t), play: on => this.play(on), view: name => this.view(name), theme: name => this.theme(name),
-      info: () => this.stage?.info() ?? null, state: () => this.stage?.state() ?? null,
-      clearance: t => clearance(this.model, t ?? this.t), size: () => this.model.time.length,
+      seek: t => this.seek(t),
+      play: on => this.play(on),
+      view: name => this.view(name),
+      theme: name => this.theme(name),
+      info: () => this.stage?.info() ?? null,
+      state: () => this.stage?.state() ?? null,
+      clearance: t => clearance(this.model, t ?? this.t),
+      size: () => this.model.time.length,
     });
   }
 }

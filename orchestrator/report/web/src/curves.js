@@ -1,8 +1,12 @@
 // Numbers behind the plots: what a panel shows in its unit, differences, and the range of its axis. No DOM.
 
-const MINUS_SIGN = '−', SUPERSCRIPT = '⁰¹²³⁴⁵⁶⁷⁸⁹';
+const MINUS_SIGN = '−',
+  SUPERSCRIPT = '⁰¹²³⁴⁵⁶⁷⁸⁹';
 
-const firstFinite = values => { for (const x of values) if (Number.isFinite(x)) return x; return 0; };
+const firstFinite = values => {
+  for (const x of values) if (Number.isFinite(x)) return x;
+  return 0;
+};
 
 // Values in the shown unit; null where there is none, which uPlot leaves open.
 export function shown(values, { factor = 1, from_start: fromStart = false }) {
@@ -39,7 +43,8 @@ const resampled = (model, name, times) => Array.from(times, t => (t > model.end 
 
 // Labels of the runs that carry the signal too, the reference first.
 function others(model, name) {
-  const end = `/${name}`, found = [];
+  const end = `/${name}`,
+    found = [];
   for (const key of Object.keys(model.arrays)) {
     if (!key.startsWith(model.prefix) || !key.endsWith(end)) continue;
     const label = key.slice(model.prefix.length, -end.length);
@@ -49,15 +54,19 @@ function others(model, name) {
 }
 
 function differences(model, panel, signal) {
-  const plain = { factor: panel.factor }, exact = model.get(`difference/${signal.name}`);
-  if (exact) return [{ ...signal, values: shown(model.atOwnTimes(`difference/${signal.name}`), plain), kind: 'difference' }];
+  const plain = { factor: panel.factor },
+    exact = model.get(`difference/${signal.name}`);
+  if (exact)
+    return [{ ...signal, values: shown(model.atOwnTimes(`difference/${signal.name}`), plain), kind: 'difference' }];
   if (!model.has(`reference/${signal.name}`)) return [];
-  const own = model.get(signal.name), theirs = model.atOwnTimes(`reference/${signal.name}`);
+  const own = model.get(signal.name),
+    theirs = model.atOwnTimes(`reference/${signal.name}`);
   return [{ ...signal, values: minus(shown(own, plain), shown(theirs, plain)), kind: 'difference' }];
 }
 
 export function extent(lists) {
-  let low = Infinity, high = -Infinity;
+  let low = Infinity,
+    high = -Infinity;
   for (const values of lists) {
     for (const x of values) {
       if (x === null || x === undefined) continue;
@@ -68,7 +77,7 @@ export function extent(lists) {
   return low <= high ? [low, high] : [0, 0];
 }
 
-const LEAST_PART = 0.2;   // of the axis that the values take where a limit is shown beside them
+const LEAST_PART = 0.2; // of the axis that the values take where a limit is shown beside them
 
 // Range of the axis: all values, and each limit that does not flatten them.
 export function range(low, high, limits = []) {

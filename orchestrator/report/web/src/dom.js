@@ -14,7 +14,7 @@ export const colour = number => css(`--c${number ?? 1}`);
 export const fixed = (value, digits = 2) => {
   if (!Number.isFinite(value)) return '–';
   const text = value.toFixed(digits);
-  return Number(text) === 0 ? text.replace('-', '') : text.replace('-', '−');   // no −0
+  return Number(text) === 0 ? text.replace('-', '') : text.replace('-', '−'); // no −0
 };
 
 // Small drawings are made in memory: where graphics are software, curves sent to "the card" take seconds.
@@ -22,8 +22,11 @@ const IN_MEMORY = { willReadFrequently: true };
 
 // Make something whose canvases are to be drawn in memory, although it does not ask for that itself (uPlot).
 export function inMemory(make) {
-  const prototype = HTMLCanvasElement.prototype, { getContext } = prototype;
-  prototype.getContext = function context(kind, options) { return getContext.call(this, kind, { ...options, ...IN_MEMORY }); };
+  const prototype = HTMLCanvasElement.prototype,
+    { getContext } = prototype;
+  prototype.getContext = function context(kind, options) {
+    return getContext.call(this, kind, { ...options, ...IN_MEMORY });
+  };
   try {
     return make();
   } finally {
@@ -33,10 +36,15 @@ export function inMemory(make) {
 
 // A canvas of as many pixels as its place on the screen has; returns what is needed to draw in CSS pixels.
 export function pixels(canvas) {
-  const ratio = Math.min(devicePixelRatio || 1, 2), width = canvas.clientWidth, height = canvas.clientHeight;
+  const ratio = Math.min(devicePixelRatio || 1, 2),
+    width = canvas.clientWidth,
+    height = canvas.clientHeight;
   if (!width || !height) return null;
   const [w, h] = [Math.round(width * ratio), Math.round(height * ratio)];
-  if (canvas.width !== w || canvas.height !== h) { canvas.width = w; canvas.height = h; }
+  if (canvas.width !== w || canvas.height !== h) {
+    canvas.width = w;
+    canvas.height = h;
+  }
   const pen = canvas.getContext('2d', IN_MEMORY);
   pen.setTransform(ratio, 0, 0, ratio, 0, 0);
   pen.clearRect(0, 0, width, height);

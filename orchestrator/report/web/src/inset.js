@@ -3,17 +3,23 @@ import { css, FONT, pixels } from './dom.js';
 import { contactArc } from './geometry.js';
 import { hermite } from './model.js';
 
-const SAMPLES = 96, MARGIN = 14, TOP = 24, MOST = 60;
+const SAMPLES = 96,
+  MARGIN = 14,
+  TOP = 24,
+  MOST = 60;
 
 const samples = nodes => {
-  const out = [], first = nodes.s[0], length = nodes.s[nodes.s.length - 1] - first;
-  for (let i = 0; i <= SAMPLES; i++) out.push(hermite(nodes, first + length * i / SAMPLES));
+  const out = [],
+    first = nodes.s[0],
+    length = nodes.s[nodes.s.length - 1] - first;
+  for (let i = 0; i <= SAMPLES; i++) out.push(hermite(nodes, first + (length * i) / SAMPLES));
   return out;
 };
 
 export class Inset {
   constructor(app, canvas) {
-    this.app = app; this.canvas = canvas;
+    this.app = app;
+    this.canvas = canvas;
     new ResizeObserver(() => app.invalidate()).observe(canvas);
   }
 
@@ -23,10 +29,14 @@ export class Inset {
     if (!this.band) return;
     const rest = model.line(model.start);
     this.rest = rest && samples(rest);
-    const lows = [...this.band.low].filter(Number.isFinite), highs = [...this.band.high].filter(Number.isFinite);
+    const lows = [...this.band.low].filter(Number.isFinite),
+      highs = [...this.band.high].filter(Number.isFinite);
     this.range = [Math.min(...lows), Math.max(...highs)];
     const length = Math.abs(this.band.y[this.band.y.length - 1] - this.band.y[0]);
-    this.canvas.setAttribute('aria-label', `The whole span of ${length.toFixed(0)} m from the side, with all shapes of the line`);
+    this.canvas.setAttribute(
+      'aria-label',
+      `The whole span of ${length.toFixed(0)} m from the side, with all shapes of the line`,
+    );
   }
 
   at(t, model) {
@@ -45,45 +55,61 @@ export class Inset {
   }
 
   #scale({ width, height }) {
-    const { y } = this.band, [low, high] = this.range, length = Math.abs(y[y.length - 1] - y[0]) || 1;
-    const kx = (width - 2 * MARGIN) / length, kz = Math.min((height - TOP - MARGIN) / (high - low || 1e-9), MOST * kx);
+    const { y } = this.band,
+      [low, high] = this.range,
+      length = Math.abs(y[y.length - 1] - y[0]) || 1;
+    const kx = (width - 2 * MARGIN) / length,
+      kz = Math.min((height - TOP - MARGIN) / (high - low || 1e-9), MOST * kx);
     const zero = Math.min(y[0], y[y.length - 1]);
     return { x: p => MARGIN + (p - zero) * kx, z: p => TOP + (high - p) * kz, ratio: kz / kx, length };
   }
 
   #supports({ pen, height }, { x, z }) {
     const { y, high } = this.band;
-    pen.strokeStyle = css('--muted'); pen.lineWidth = 2;
+    pen.strokeStyle = css('--muted');
+    pen.lineWidth = 2;
     for (const j of [0, y.length - 1]) {
       const [px, pz] = [x(y[j]), z(high[j])];
       pen.beginPath();
-      pen.moveTo(px, pz - 6); pen.lineTo(px, height);
-      pen.moveTo(px - 6, pz - 2); pen.lineTo(px + 6, pz - 2);
+      pen.moveTo(px, pz - 6);
+      pen.lineTo(px, height);
+      pen.moveTo(px - 6, pz - 2);
+      pen.lineTo(px + 6, pz - 2);
       pen.stroke();
     }
   }
 
   #band({ pen }, { x, z }) {
     const { y, low, high } = this.band;
-    pen.fillStyle = css('--band'); pen.beginPath();
+    pen.fillStyle = css('--band');
+    pen.beginPath();
     for (let j = 0; j < y.length; j++) pen.lineTo(x(y[j]), z(high[j]));
     for (let j = y.length - 1; j >= 0; j--) pen.lineTo(x(y[j]), z(low[j]));
     pen.fill();
   }
 
   #caption({ pen, width }, { ratio, length }) {
-    pen.fillStyle = css('--muted'); pen.font = `11px ${FONT}`; pen.textAlign = 'center';
+    pen.fillStyle = css('--muted');
+    pen.font = `11px ${FONT}`;
+    pen.textAlign = 'center';
     const times = ratio >= 10 ? ratio.toFixed(0) : ratio.toFixed(1);
     pen.fillText(`span ${length.toFixed(0)} m, heights ×${times}; band: all shapes`, width / 2, 13);
   }
 }
 
 function stroke(pen, points, { x, z }, style, width, dash = []) {
-  pen.setLineDash(dash); pen.strokeStyle = style; pen.lineWidth = width; pen.beginPath();
+  pen.setLineDash(dash);
+  pen.strokeStyle = style;
+  pen.lineWidth = width;
+  pen.beginPath();
   for (const p of points) pen.lineTo(x(p[1]), z(p[2]));
-  pen.stroke(); pen.setLineDash([]);
+  pen.stroke();
+  pen.setLineDash([]);
 }
 
 function dot(pen, p, { x, z }) {
-  pen.fillStyle = css('--robot'); pen.beginPath(); pen.arc(x(p[1]), z(p[2]), 4.5, 0, 7); pen.fill();
+  pen.fillStyle = css('--robot');
+  pen.beginPath();
+  pen.arc(x(p[1]), z(p[2]), 4.5, 0, 7);
+  pen.fill();
 }

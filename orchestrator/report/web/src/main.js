@@ -4,7 +4,7 @@ import { read } from './model.js';
 import { whatif } from './whatif.js';
 
 const started = performance.now();
-const page = window.__page = { ready: false, frames: 0, time: 0, playing: false, errors: [] };
+const page = (window.__page = { ready: false, frames: 0, time: 0, playing: false, errors: [] });
 addEventListener('error', event => page.errors.push(String(event.message)));
 addEventListener('unhandledrejection', event => page.errors.push(String(event.reason)));
 

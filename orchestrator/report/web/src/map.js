@@ -4,7 +4,11 @@ import { css, element, fixed } from './dom.js';
 import { edges, outline, shade } from './mapping.js';
 
 const NS = 'http://www.w3.org/2000/svg';
-const LEFT = 76, RIGHT = 16, TOP = 12, BOTTOM = 50, WIDTH = 900;   // of the drawing, in its own units
+const LEFT = 76,
+  RIGHT = 16,
+  TOP = 12,
+  BOTTOM = 50,
+  WIDTH = 900; // of the drawing, in its own units
 const LETTERS = 'abcdefghijklmnopqrstuvwxyz';
 
 const svg = (tag, attributes = {}, text = null) => {
@@ -16,14 +20,25 @@ const svg = (tag, attributes = {}, text = null) => {
 
 const USUAL_MEASURES = [
   { key: 'margin', label: 'Least margin', unit: '%', factor: 100, digits: 0, kind: 'margin' },
-  { key: 'probability', label: 'Probability that all limits hold', unit: '%', factor: 100, digits: 0, kind: 'probability' },
+  {
+    key: 'probability',
+    label: 'Probability that all limits hold',
+    unit: '%',
+    factor: 100,
+    digits: 0,
+    kind: 'probability',
+  },
 ];
 
 export class SweepMap {
   constructor(app, root) {
-    this.app = app; this.root = root; this.map = app.original.head.map;
+    this.app = app;
+    this.root = root;
+    this.map = app.original.head.map;
     this.cells = this.map?.cells ?? [];
-    this.measures = (this.map?.measures ?? USUAL_MEASURES).filter(m => this.cells.some(c => Number.isFinite(c[m.key])));
+    this.measures = (this.map?.measures ?? USUAL_MEASURES).filter(m =>
+      this.cells.some(c => Number.isFinite(c[m.key])),
+    );
     this.measure = this.measures[0] ?? USUAL_MEASURES[0];
     this.limits = this.map?.limits ?? [...new Set(this.cells.map(c => c.limit).filter(Boolean))].sort();
     for (const cell of this.cells) cell.words = this.#words(cell);
@@ -31,12 +46,21 @@ export class SweepMap {
     app.page.map = { cells: this.cells, open: i => this.#open(i), select: i => this.#select(i) };
   }
 
-  show() { if (this.map) this.draw(); }
-  theme() { if (this.map) this.draw(); }
+  show() {
+    if (this.map) this.draw();
+  }
+  theme() {
+    if (this.map) this.draw();
+  }
 
   #frame() {
     const title = element('h2', { textContent: this.map?.title ?? 'Where it is safe to land' });
-    const select = element('select', { onchange: () => { this.measure = this.measures[select.selectedIndex]; this.draw(); } });
+    const select = element('select', {
+      onchange: () => {
+        this.measure = this.measures[select.selectedIndex];
+        this.draw();
+      },
+    });
     select.append(...this.measures.map(m => element('option', { textContent: m.label })));
     const choice = element('label', { hidden: this.measures.length < 2 }, 'shown ', select);
     this.host = element('div', { className: 'map' });
@@ -44,17 +68,31 @@ export class SweepMap {
     this.said = element('p', { className: 'map-said' });
     this.said.setAttribute('aria-live', 'polite');
     const hint = this.map?.text ?? '';
-    this.root.prepend(title, element('p', { className: 'map-text', textContent: hint, hidden: !hint }), choice, this.host, this.key, this.said);
+    this.root.prepend(
+      title,
+      element('p', { className: 'map-text', textContent: hint, hidden: !hint }),
+      choice,
+      this.host,
+      this.key,
+      this.said,
+    );
   }
 
   draw() {
-    const { x, y } = this.map, kept = this.chosen ?? 0;
-    const rows = y?.values.length ?? 1, height = TOP + BOTTOM + Math.min(420, Math.max(70, rows * 44));
+    const { x, y } = this.map,
+      kept = this.chosen ?? 0;
+    const rows = y?.values.length ?? 1,
+      height = TOP + BOTTOM + Math.min(420, Math.max(70, rows * 44));
     const box = { x0: LEFT, x1: WIDTH - RIGHT, y0: TOP, y1: height - BOTTOM };
-    this.ex = edges(x); this.ey = y ? edges(y) : [0, 1];
-    this.px = v => box.x0 + (v - this.ex[0]) / (this.ex[this.ex.length - 1] - this.ex[0]) * (box.x1 - box.x0);
-    this.py = v => box.y1 - (v - this.ey[0]) / (this.ey[this.ey.length - 1] - this.ey[0]) * (box.y1 - box.y0);
-    const drawing = svg('svg', { viewBox: `0 0 ${WIDTH} ${height}`, role: 'group', 'aria-label': `${this.measure.label}: map of ${this.cells.length} landings` });
+    this.ex = edges(x);
+    this.ey = y ? edges(y) : [0, 1];
+    this.px = v => box.x0 + ((v - this.ex[0]) / (this.ex[this.ex.length - 1] - this.ex[0])) * (box.x1 - box.x0);
+    this.py = v => box.y1 - ((v - this.ey[0]) / (this.ey[this.ey.length - 1] - this.ey[0])) * (box.y1 - box.y0);
+    const drawing = svg('svg', {
+      viewBox: `0 0 ${WIDTH} ${height}`,
+      role: 'group',
+      'aria-label': `${this.measure.label}: map of ${this.cells.length} landings`,
+    });
     this.rects = this.cells.map((cell, i) => this.#cell(drawing, cell, i));
     this.#outline(drawing);
     this.#axes(drawing, box, x, y);
@@ -70,9 +108,19 @@ export class SweepMap {
   }
 
   #cell(drawing, cell, i) {
-    const value = cell[this.measure.key], at = this.#box(cell), known = Number.isFinite(value);
+    const value = cell[this.measure.key],
+      at = this.#box(cell),
+      known = Number.isFinite(value);
     const { fill, ink } = shade(value, this.measure.kind ?? 'margin');
-    const rect = svg('rect', { ...at, fill, tabindex: '-1', role: 'button', 'aria-label': cell.words, 'data-own-keys': '', class: known ? 'cell' : 'cell unknown' });
+    const rect = svg('rect', {
+      ...at,
+      fill,
+      tabindex: '-1',
+      role: 'button',
+      'aria-label': cell.words,
+      'data-own-keys': '',
+      class: known ? 'cell' : 'cell unknown',
+    });
     rect.append(svg('title', {}, cell.words));
     rect.addEventListener('click', () => this.#open(i));
     rect.addEventListener('focus', () => this.#select(i));
@@ -84,24 +132,43 @@ export class SweepMap {
 
   // The number where there is room, and a letter for the limit that binds.
   #letters(drawing, cell, at, known, ink) {
-    const letter = LETTERS[this.limits.indexOf(cell.limit)] ?? '', { factor = 1, digits = 0, key } = this.measure;
+    const letter = LETTERS[this.limits.indexOf(cell.limit)] ?? '',
+      { factor = 1, digits = 0, key } = this.measure;
     const number = known && at.width > 42 ? fixed(factor * cell[key], digits) : '';
     const text = known ? [number, letter].filter(Boolean).join(' ') : '×';
     const size = at.width > 42 ? 13 : 11;
-    drawing.append(svg('text', { x: at.x + at.width / 2, y: at.y + at.height / 2 + 4, fill: known ? ink : css('--muted'), class: 'map-letter', 'font-size': size }, text));
+    drawing.append(
+      svg(
+        'text',
+        {
+          x: at.x + at.width / 2,
+          y: at.y + at.height / 2 + 4,
+          fill: known ? ink : css('--muted'),
+          class: 'map-letter',
+          'font-size': size,
+        },
+        text,
+      ),
+    );
   }
 
   // Between landings that are safe and those that are not.
   #outline(drawing) {
     const isSafe = cell => (cell.verdict ? cell.verdict === 'safe' : cell.margin >= 0);
-    const lines = outline(this.cells.filter(c => !c.box && Number.isFinite(c.margin)), isSafe).map(([a, b]) => `M${this.#corner(a)}L${this.#corner(b)}`);
+    const lines = outline(
+      this.cells.filter(c => !c.box && Number.isFinite(c.margin)),
+      isSafe,
+    ).map(([a, b]) => `M${this.#corner(a)}L${this.#corner(b)}`);
     drawing.append(svg('path', { d: lines.join(''), class: 'map-outline' }));
   }
 
-  #corner([i, j]) { return `${this.px(this.ex[i])} ${this.py(this.ey[j])}`; }
+  #corner([i, j]) {
+    return `${this.px(this.ex[i])} ${this.py(this.ey[j])}`;
+  }
 
   #axes(drawing, { x0, x1, y0, y1 }, x, y) {
-    const text = (px, py, words, anchor = 'middle', more = {}) => drawing.append(svg('text', { x: px, y: py, 'text-anchor': anchor, class: 'map-axis', ...more }, words));
+    const text = (px, py, words, anchor = 'middle', more = {}) =>
+      drawing.append(svg('text', { x: px, y: py, 'text-anchor': anchor, class: 'map-axis', ...more }, words));
     const name = axis => (axis.unit && axis.unit !== '1' ? `${axis.label} [${axis.unit}]` : axis.label);
     ticks(x, this.ex, (x1 - x0) / 52).forEach(([v, words]) => text(this.px(v), y1 + 18, words));
     text((x0 + x1) / 2, y1 + 40, name(x));
@@ -111,17 +178,43 @@ export class SweepMap {
   }
 
   #legend() {
-    const { label, unit = '', factor = 1, kind = 'margin' } = this.measure, stops = kind === 'probability' ? [0, 0.5, 0.9, 1] : [-0.5, -0.01, 0.01, 0.5, 1];
-    const patch = value => element('span', {}, element('i', { style: `background:${shade(value, kind).fill}` }), `${fixed(Math.round(value * 10) / 10 * factor, 0)} ${unit}`);
-    const names = this.limits.map((name, i) => element('span', {}, element('b', { textContent: LETTERS[i] }), ` ${this.map.limit_names?.[name] ?? name}`));
+    const { label, unit = '', factor = 1, kind = 'margin' } = this.measure,
+      stops = kind === 'probability' ? [0, 0.5, 0.9, 1] : [-0.5, -0.01, 0.01, 0.5, 1];
+    const patch = value =>
+      element(
+        'span',
+        {},
+        element('i', { style: `background:${shade(value, kind).fill}` }),
+        `${fixed((Math.round(value * 10) / 10) * factor, 0)} ${unit}`,
+      );
+    const names = this.limits.map((name, i) =>
+      element('span', {}, element('b', { textContent: LETTERS[i] }), ` ${this.map.limit_names?.[name] ?? name}`),
+    );
     const line = element('span', {}, element('i', { className: 'k-outline' }), 'edge of the safe region');
-    const missing = this.cells.some(c => !Number.isFinite(c[this.measure.key])) ? [element('span', {}, element('b', { textContent: '×' }), ' no result')] : [];
-    this.key.replaceChildren(element('span', { textContent: `${label}:` }), ...stops.map(patch), line, ...(names.length ? [element('span', { textContent: 'Binding limit:' }), ...names] : []), ...missing);
+    const missing = this.cells.some(c => !Number.isFinite(c[this.measure.key]))
+      ? [element('span', {}, element('b', { textContent: '×' }), ' no result')]
+      : [];
+    this.key.replaceChildren(
+      element('span', { textContent: `${label}:` }),
+      ...stops.map(patch),
+      line,
+      ...(names.length ? [element('span', { textContent: 'Binding limit:' }), ...names] : []),
+      ...missing,
+    );
   }
 
   #words(cell) {
-    const where = [[this.map.x, cell.x], [this.map.y, cell.y ?? 0]].filter(([axis]) => axis).map(([axis, i]) => `${axis.label} ${named(axis, i)}`);
-    const facts = this.measures.filter(m => Number.isFinite(cell[m.key])).map(m => `${m.label.toLowerCase()} ${fixed((m.factor ?? 1) * cell[m.key], m.digits ?? 0)} ${m.unit ?? ''}`.trim());
+    const where = [
+      [this.map.x, cell.x],
+      [this.map.y, cell.y ?? 0],
+    ]
+      .filter(([axis]) => axis)
+      .map(([axis, i]) => `${axis.label} ${named(axis, i)}`);
+    const facts = this.measures
+      .filter(m => Number.isFinite(cell[m.key]))
+      .map(m =>
+        `${m.label.toLowerCase()} ${fixed((m.factor ?? 1) * cell[m.key], m.digits ?? 0)} ${m.unit ?? ''}`.trim(),
+      );
     const binds = cell.limit ? [`${this.map.limit_names?.[cell.limit] ?? cell.limit} binds`] : [];
     return cell.text ?? [where.join(', '), ...[cell.verdict, ...facts, ...binds].filter(Boolean)].join('; ');
   }
@@ -139,7 +232,10 @@ export class SweepMap {
 
   #key(event, i) {
     const step = { ArrowLeft: [-1, 0], ArrowRight: [1, 0], ArrowUp: [0, 1], ArrowDown: [0, -1] }[event.key];
-    if (event.key === 'Enter' || event.key === ' ') { event.preventDefault(); this.#open(i); }
+    if (event.key === 'Enter' || event.key === ' ') {
+      event.preventDefault();
+      this.#open(i);
+    }
     if (!step) return;
     event.preventDefault();
     const next = this.#neighbour(this.cells[i], step);
@@ -149,11 +245,13 @@ export class SweepMap {
   // The nearest cell in a direction; a map may have holes.
   #neighbour(cell, [dx, dy]) {
     const distance = c => {
-      const [x, y] = [(c.x - cell.x) * (dx || dy * 0) , ((c.y ?? 0) - (cell.y ?? 0)) * dy];
-      const ahead = dx ? x : y, aside = dx ? Math.abs((c.y ?? 0) - (cell.y ?? 0)) : Math.abs(c.x - cell.x);
+      const [x, y] = [(c.x - cell.x) * (dx || dy * 0), ((c.y ?? 0) - (cell.y ?? 0)) * dy];
+      const ahead = dx ? x : y,
+        aside = dx ? Math.abs((c.y ?? 0) - (cell.y ?? 0)) : Math.abs(c.x - cell.x);
       return ahead > 0 ? ahead + 100 * aside : Infinity;
     };
-    const all = this.cells.map(distance), least = Math.min(...all);
+    const all = this.cells.map(distance),
+      least = Math.min(...all);
     return Number.isFinite(least) ? all.indexOf(least) : -1;
   }
 
@@ -163,7 +261,9 @@ export class SweepMap {
     this.said.textContent = `${cell.words} …`;
     try {
       const opened = await this.app.open(cell);
-      this.said.textContent = opened ? `${cell.words}: shown in the replay and the plots` : `${cell.words}: its signals were not kept, and it cannot be solved here`;
+      this.said.textContent = opened
+        ? `${cell.words}: shown in the replay and the plots`
+        : `${cell.words}: its signals were not kept, and it cannot be solved here`;
       return opened;
     } catch (error) {
       this.said.textContent = `${cell.words}: ${error.message ?? error}`;
@@ -180,7 +280,8 @@ const named = (axis, i) => {
 
 // Ticks at the values, fewer where they would run together: [[place, words]].
 function ticks(axis, cells, most) {
-  const n = axis.values.length, every = Math.max(1, Math.ceil(n / Math.max(most, 1)));
+  const n = axis.values.length,
+    every = Math.max(1, Math.ceil(n / Math.max(most, 1)));
   const words = i => String(axis.labels?.[i] ?? +Number(axis.values[i]).toPrecision(5));
   return axis.values.map((_, i) => [(cells[i] + cells[i + 1]) / 2, words(i)]).filter((_, i) => i % every === 0);
 }

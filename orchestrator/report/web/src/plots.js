@@ -4,12 +4,18 @@ import { axisText, curves, extent, power, powerText, range } from './curves.js';
 import { colour, css, element, fixed, FONT, inMemory } from './dom.js';
 import { locate } from './model.js';
 
-const LEAST = 118, MOST = 200, PHONE = 520, LAST = 20;   // px; the last panel carries the axis of time
-const CLICK = 4;                                         // px that a click may move
+const LEAST = 118,
+  MOST = 200,
+  PHONE = 520,
+  LAST = 20; // px; the last panel carries the axis of time
+const CLICK = 4; // px that a click may move
 
 export class Plots {
   constructor(app, root) {
-    this.app = app; this.root = root; this.list = []; this.mode = 'values';
+    this.app = app;
+    this.root = root;
+    this.list = [];
+    this.mode = 'values';
     this.#buttons();
     this.body = element('div', { className: 'panels' });
     root.append(this.bar, this.body);
@@ -17,9 +23,18 @@ export class Plots {
   }
 
   #buttons() {
-    const button = (mode, text) => element('button', { type: 'button', textContent: text, onclick: () => this.#setMode(mode) });
-    this.modes = { values: button('values', 'Values'), difference: button('difference', 'Difference from the reference') };
-    this.whole = element('button', { type: 'button', textContent: 'Whole time', hidden: true, onclick: () => this.#zoom(null) });
+    const button = (mode, text) =>
+      element('button', { type: 'button', textContent: text, onclick: () => this.#setMode(mode) });
+    this.modes = {
+      values: button('values', 'Values'),
+      difference: button('difference', 'Difference from the reference'),
+    };
+    this.whole = element('button', {
+      type: 'button',
+      textContent: 'Whole time',
+      hidden: true,
+      onclick: () => this.#zoom(null),
+    });
     const hint = element('span', { className: 'hint', textContent: 'drag to zoom, click to go there' });
     this.switch = element('span', { className: 'group' }, ...Object.values(this.modes));
     this.bar = element('div', { className: 'plot-bar' }, this.switch, this.whole, hint);
@@ -33,44 +48,67 @@ export class Plots {
 
   show(model) {
     this.model = model;
-    this.comparable = model.hasReference || Object.keys(model.arrays).some(name => name.startsWith(`${model.prefix}difference/`));
+    this.comparable =
+      model.hasReference || Object.keys(model.arrays).some(name => name.startsWith(`${model.prefix}difference/`));
     if (!this.comparable) this.mode = 'values';
     this.switch.hidden = !this.comparable;
     this.build();
   }
 
-  theme() { this.build(); }
+  theme() {
+    this.build();
+  }
 
   // Draw at once what else would be drawn after this task: for paper.
-  flush() { for (const { plot } of this.list) plot.batch(() => {}); }
+  flush() {
+    for (const { plot } of this.list) plot.batch(() => {});
+  }
 
   build() {
     const kept = this.zoomed;
     for (const { plot } of this.list) plot.destroy();
     this.body.replaceChildren();
     this.list = [];
-    for (const [name, button] of Object.entries(this.modes)) button.setAttribute('aria-pressed', String(name === this.mode));
-    const panels = this.model?.time.length > 1 ? this.model.head.plots ?? [] : [];
+    for (const [name, button] of Object.entries(this.modes))
+      button.setAttribute('aria-pressed', String(name === this.mode));
+    const panels = this.model?.time.length > 1 ? (this.model.head.plots ?? []) : [];
     const made = panels.map(panel => this.#content(panel)).filter(content => content.curves.length);
-    made.forEach((content, i) => this.app.guard('plots', () => this.list.push(this.#panel(content, i === made.length - 1))));
+    made.forEach((content, i) =>
+      this.app.guard('plots', () => this.list.push(this.#panel(content, i === made.length - 1))),
+    );
     this.resize();
     if (kept) this.#zoom(kept);
   }
 
   // What a panel shows, scaled by a power of a thousand where differences are small.
   #content(panel) {
-    const original = this.model === this.app.original || this.model.prefix !== this.app.original.prefix ? null : this.app.original;
-    const found = curves(this.model, panel, this.mode, original), isDifference = this.mode === 'difference';
+    const original =
+      this.model === this.app.original || this.model.prefix !== this.app.original.prefix ? null : this.app.original;
+    const found = curves(this.model, panel, this.mode, original),
+      isDifference = this.mode === 'difference';
     const exponent = isDifference ? power(found.map(c => c.values)) : 0;
     if (exponent) for (const c of found) c.values = c.values.map(x => (x === null ? null : x / 10 ** exponent));
     const unit = `${powerText(exponent)}${panel.unit ?? ''}`.trim();
-    return { ...panel, curves: found, unit, limits: isDifference ? [] : panel.limits ?? [], title: isDifference ? `Δ ${panel.title}` : panel.title };
+    return {
+      ...panel,
+      curves: found,
+      unit,
+      limits: isDifference ? [] : (panel.limits ?? []),
+      title: isDifference ? `Δ ${panel.title}` : panel.title,
+    };
   }
 
   #panel(content, isLast) {
     const value = element('span', { className: 'now' });
-    const caption = element('figcaption', {}, element('b', { textContent: content.title }), element('span', { className: 'unit', textContent: content.unit }), value);
-    const host = element('div'), figure = element('figure', {}, caption, host);
+    const caption = element(
+      'figcaption',
+      {},
+      element('b', { textContent: content.title }),
+      element('span', { className: 'unit', textContent: content.unit }),
+      value,
+    );
+    const host = element('div'),
+      figure = element('figure', {}, caption, host);
     figure.setAttribute('aria-label', `${content.title}${content.unit ? `, ${content.unit}` : ''}, over time`);
     figure.setAttribute('role', 'group');
     this.body.append(figure);
@@ -83,24 +121,48 @@ export class Plots {
   }
 
   #options(content, isLast) {
-    const axis = { stroke: css('--ink'), grid: { stroke: css('--rule'), width: 1 }, ticks: { show: false }, font: `11px ${FONT}` };
-    const [low, high] = extent(content.curves.map(c => c.values)), limits = range(low, high, content.limits);
+    const axis = {
+      stroke: css('--ink'),
+      grid: { stroke: css('--rule'), width: 1 },
+      ticks: { show: false },
+      font: `11px ${FONT}`,
+    };
+    const [low, high] = extent(content.curves.map(c => c.values)),
+      limits = range(low, high, content.limits);
     return {
-      width: 400, height: LEAST, legend: { show: false }, padding: [6, 16, isLast ? 0 : -8, 0],
-      cursor: { sync: { key: 'replay', scales: ['x', null] }, drag: { x: true, y: false, dist: 6 }, points: { size: 6 } },
+      width: 400,
+      height: LEAST,
+      legend: { show: false },
+      padding: [6, 16, isLast ? 0 : -8, 0],
+      cursor: {
+        sync: { key: 'replay', scales: ['x', null] },
+        drag: { x: true, y: false, dist: 6 },
+        points: { size: 6 },
+      },
       scales: { x: { time: false }, y: { range: () => limits } },
       axes: [
         { ...axis, size: isLast ? 30 : 12, values: (_, ticks) => (isLast ? seconds(ticks) : ticks.map(() => '')) },
-        { ...axis, size: 50, space: 26, values: (_, ticks) => ticks.map(v => axisText(v, ticks.length > 1 ? ticks[1] - ticks[0] : 1)) },
+        {
+          ...axis,
+          size: 50,
+          space: 26,
+          values: (_, ticks) => ticks.map(v => axisText(v, ticks.length > 1 ? ticks[1] - ticks[0] : 1)),
+        },
       ],
       series: [{}, ...content.curves.map(series)],
-      hooks: { draw: [plot => drawLimits(plot, content.limits)], setScale: [(plot, key) => key === 'x' && this.#zoomed(plot)], setCursor: [() => this.#values()] },
+      hooks: {
+        draw: [plot => drawLimits(plot, content.limits)],
+        setScale: [(plot, key) => key === 'x' && this.#zoomed(plot)],
+        setCursor: [() => this.#values()],
+      },
     };
   }
 
   #clicks(plot) {
     let down = 0;
-    plot.over.addEventListener('mousedown', event => { down = event.clientX; });
+    plot.over.addEventListener('mousedown', event => {
+      down = event.clientX;
+    });
     plot.over.addEventListener('mouseup', event => {
       if (Math.abs(event.clientX - down) < CLICK) this.app.seek(plot.posToVal(event.offsetX, 'x'));
     });
@@ -110,7 +172,8 @@ export class Plots {
   // All panels show the same stretch of time.
   #zoomed(plot) {
     if (this.zooming || !this.list.length) return;
-    const { min, max } = plot.scales.x, whole = min <= this.model.start + 1e-9 && max >= this.model.end - 1e-9;
+    const { min, max } = plot.scales.x,
+      whole = min <= this.model.start + 1e-9 && max >= this.model.end - 1e-9;
     this.#zoom(whole ? null : [min, max]);
   }
 
@@ -134,7 +197,8 @@ export class Plots {
 
   // Beside the stage the panels share its height.
   #height(width) {
-    const { stage } = this.app.places, beside = !stage.hidden && stage.offsetTop === this.root.offsetTop && stage.offsetHeight;
+    const { stage } = this.app.places,
+      beside = !stage.hidden && stage.offsetTop === this.root.offsetTop && stage.offsetHeight;
     if (!beside || width < PHONE / 2) return width < PHONE ? LEAST + 12 : 150;
     const room = stage.offsetHeight - this.bar.offsetHeight - LAST - 10 - 22 * this.list.length;
     return Math.min(MOST, Math.max(LEAST, Math.floor(room / this.list.length)));
@@ -152,13 +216,21 @@ export class Plots {
   // Values under the pointer where it is in a plot, else at the time shown.
   #values() {
     for (const { plot, value, content } of this.list) {
-      const hovered = plot.cursor.idx, [i, f] = locate(this.model.time, this.app.t), at = hovered ?? i + Math.round(f);
-      const words = content.curves.filter(c => c.kind !== 'reference').map(c => {
-        const x = c.values[at], text = x === null || x === undefined ? '–' : fixed(x, content.digits ?? 2);
-        const name = content.curves.length > 1 && c.label ? `${c.label} ` : '';
-        return element('span', {}, element('i', { style: `background:${colour(c.colour)}` }), `${name}${text}`);
-      });
-      const when = hovered == null ? [] : [element('span', { className: 'when', textContent: `${fixed(this.model.time[at], 2)} s` })];
+      const hovered = plot.cursor.idx,
+        [i, f] = locate(this.model.time, this.app.t),
+        at = hovered ?? i + Math.round(f);
+      const words = content.curves
+        .filter(c => c.kind !== 'reference')
+        .map(c => {
+          const x = c.values[at],
+            text = x === null || x === undefined ? '–' : fixed(x, content.digits ?? 2);
+          const name = content.curves.length > 1 && c.label ? `${c.label} ` : '';
+          return element('span', {}, element('i', { style: `background:${colour(c.colour)}` }), `${name}${text}`);
+        });
+      const when =
+        hovered == null
+          ? []
+          : [element('span', { className: 'when', textContent: `${fixed(this.model.time[at], 2)} s` })];
       value.replaceChildren(...when, ...words);
     }
   }
@@ -171,23 +243,46 @@ const DASHES = { own: undefined, reference: [4, 4], other: [8, 4], difference: u
 function series({ label, colour: number, dash, kind }) {
   const style = { own: 1.5, reference: 1.2, other: 1.2, difference: 1.4 };
   return {
-    label, stroke: kind === 'reference' ? css('--reference') : colour(number), width: style[kind], points: { show: false },
+    label,
+    stroke: kind === 'reference' ? css('--reference') : colour(number),
+    width: style[kind],
+    points: { show: false },
     dash: DASHES[kind] ?? (Array.isArray(dash) ? dash : dash ? [6, 4] : undefined),
   };
 }
 
 // Dashed lines; a limit beyond the axis is named at the edge that it lies behind.
 function drawLimits(plot, limits) {
-  const { ctx: pen, bbox: { left, top, width, height } } = plot, px = devicePixelRatio || 1;
+  const {
+      ctx: pen,
+      bbox: { left, top, width, height },
+    } = plot,
+    px = devicePixelRatio || 1;
   pen.save();
-  Object.assign(pen, { strokeStyle: css('--bad'), fillStyle: css('--bad'), lineWidth: px, textAlign: 'right', font: `${11 * px}px ${FONT}` });
+  Object.assign(pen, {
+    strokeStyle: css('--bad'),
+    fillStyle: css('--bad'),
+    lineWidth: px,
+    textAlign: 'right',
+    font: `${11 * px}px ${FONT}`,
+  });
   pen.setLineDash([6 * px, 4 * px]);
   for (const { at, name } of limits) {
-    const y = plot.valToPos(at, 'y', true), above = y < top, below = y > top + height;
+    const y = plot.valToPos(at, 'y', true),
+      above = y < top,
+      below = y > top + height;
     if (!above && !below) {
-      pen.beginPath(); pen.moveTo(left, y); pen.lineTo(left + width, y); pen.stroke();
+      pen.beginPath();
+      pen.moveTo(left, y);
+      pen.lineTo(left + width, y);
+      pen.stroke();
     }
-    if (name) pen.fillText(above ? `${name} ↑` : below ? `${name} ↓` : name, left + width - 4 * px, labelHeight(y, top, height, px));
+    if (name)
+      pen.fillText(
+        above ? `${name} ↑` : below ? `${name} ↓` : name,
+        left + width - 4 * px,
+        labelHeight(y, top, height, px),
+      );
   }
   pen.restore();
 }

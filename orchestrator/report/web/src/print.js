@@ -22,6 +22,10 @@ export function printable(app) {
 // The picture lies where the canvas does; style.css shows it on paper alone.
 function picture(canvas) {
   if (!canvas.width || !canvas.height || !canvas.clientWidth) return;
-  const image = element('img', { className: `printed ${canvas.className}`, src: canvas.toDataURL(), alt: canvas.getAttribute('aria-label') ?? '' });
+  const image = element('img', {
+    className: `printed ${canvas.className}`,
+    src: canvas.toDataURL(),
+    alt: canvas.getAttribute('aria-label') ?? '',
+  });
   canvas.after(image);
 }

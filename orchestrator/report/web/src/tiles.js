@@ -1,6 +1,7 @@
 // Verdict and tiles: written by the server for the landing of the page, rewritten for what is shown instead.
 //   <div class="tile" data-limit="roll"> … <b>value</b> <small>note</small> <div class="bar"><i style="width:…">
 import { fixed } from './dom.js';
+import { clearance } from './geometry.js';
 
 const DEGREES = 180 / Math.PI;
 const READABLE = { rad: ['°', DEGREES, 1], m: ['mm', 1000, 0], N: ['kN', 1e-3, 2], 1: ['%', 100, 1] };
@@ -17,8 +18,16 @@ export class Tiles {
     this.verdict = document.querySelector('.verdict');
     this.covers = document.getElementById('covers');
     this.note = document.querySelector('.what-if-note');
-    this.kept = [...document.querySelectorAll('.tile')].map(tile => ({ tile, html: tile.innerHTML, style: tile.className }));
-    this.word = this.verdict && { text: this.verdict.textContent, style: this.verdict.className, covers: this.covers?.textContent };
+    this.kept = [...document.querySelectorAll('.tile')].map(tile => ({
+      tile,
+      html: tile.innerHTML,
+      style: tile.className,
+    }));
+    this.word = this.verdict && {
+      text: this.verdict.textContent,
+      style: this.verdict.className,
+      covers: this.covers?.textContent,
+    };
   }
 
   show(model, note) {
@@ -40,7 +49,10 @@ export class Tiles {
   // What is shown is not what was recorded: said beside the verdict.
   #says(note) {
     if (!this.verdict) return;
-    this.note ??= this.verdict.insertAdjacentElement('afterend', Object.assign(document.createElement('span'), { className: 'what-if-note' }));
+    this.note ??= this.verdict.insertAdjacentElement(
+      'afterend',
+      Object.assign(document.createElement('span'), { className: 'what-if-note' }),
+    );
     this.note.textContent = note;
     this.note.hidden = !note;
   }
@@ -48,12 +60,18 @@ export class Tiles {
   #fill(tile, model) {
     const { limit, tile: kind } = tile.dataset;
     const { value, small, used, over = false } = limit ? ofLimit(model, limit) : (OTHERS[kind]?.(model) ?? NOTHING);
-    const write = (selector, text) => { const part = tile.querySelector(selector); if (part) part.textContent = text; };
+    const write = (selector, text) => {
+      const part = tile.querySelector(selector);
+      if (part) part.textContent = text;
+    };
     write('b', value);
     write('small', small);
     const bar = tile.querySelector('.bar i');
     if (bar) bar.style.width = `${Math.min(100, 100 * Math.max(0, used ?? 0))}%`;
-    bar?.parentElement.setAttribute('aria-label', used === undefined ? 'not known' : `${fixed(100 * used, 0)} % of the limit used`);
+    bar?.parentElement.setAttribute(
+      'aria-label',
+      used === undefined ? 'not known' : `${fixed(100 * used, 0)} % of the limit used`,
+    );
     tile.classList.toggle('over', over);
   }
 }
@@ -62,8 +80,14 @@ const NOTHING = { value: '–', small: 'not known of what is shown' };
 
 function ofLimit(model, name) {
   const judged = model.head.limits?.[name];
-  if (!judged || !Number.isFinite(judged.worst)) return { value: '–', small: judged ? 'not finite' : `not judged: ${model.head.not_judged?.[name] ?? 'not known'}`, over: Boolean(judged) };
-  const { unit, limit, margin, share, time, wheel, verdict } = judged, at = ` at ${fixed(time, 2)} s${wheel ? `, wheel ${wheel}` : ''}`;
+  if (!judged || !Number.isFinite(judged.worst))
+    return {
+      value: '–',
+      small: judged ? 'not finite' : `not judged: ${model.head.not_judged?.[name] ?? 'not known'}`,
+      over: Boolean(judged),
+    };
+  const { unit, limit, margin, share, time, wheel, verdict } = judged,
+    at = ` at ${fixed(time, 2)} s${wheel ? `, wheel ${wheel}` : ''}`;
   const small = `limit ${readable(limit, unit)}: ${BEYOND[verdict] ?? 'margin'} ${readable(Math.abs(margin), unit)}${at}`;
   return { value: readable(Math.abs(judged.worst), unit), small, used: share, over: verdict === 'exceeded' };
 }
@@ -73,27 +97,29 @@ function largestForce(model) {
   let top = null;
   for (const k of model.contacts) {
     const values = model.get(`contact${k}.normal_force_max`) ?? model.get(`contact${k}.normal_force`) ?? [];
-    values.forEach((x, i) => { if (!top || x > top.x) top = { x, i, k }; });
+    values.forEach((x, i) => {
+      if (!top || x > top.x) top = { x, i, k };
+    });
   }
   if (!top) return NOTHING;
   const wheel = model.contacts.length > 1 ? `, wheel ${top.k}` : '';
-  return { value: top.x >= 1e4 ? `${fixed(top.x / 1e3, 1)} kN` : `${fixed(top.x, 0)} N`, small: `at ${fixed(model.time[top.i], 2)} s${wheel}` };
+  return {
+    value: top.x >= 1e4 ? `${fixed(top.x / 1e3, 1)} kN` : `${fixed(top.x, 0)} N`,
+    small: `at ${fixed(model.time[top.i], 2)} s${wheel}`,
+  };
 }
 
-// The gap between line and rim of the rotor plane, from the roll against the line: as orchestrator/landing/workspace.py.
+// The least gap between the rotors' plane and the line, over all shapes of the line.
 function leastGap(model) {
-  const { robot } = model.head, roll = model.get('robot.roll'), level = Math.abs(robot?.line ?? NaN);
-  if (!roll || !Number.isFinite(level) || !Number.isFinite(robot.along ?? NaN)) return NOTHING;
+  const times = model.get(`${model.linePrefix}line.time`) ?? [],
+    level = Math.abs(model.head.robot?.line ?? NaN);
   let least = null;
-  for (const k of model.contacts) {
-    const [y, z] = ['y', 'z'].map(axis => model.get(`cable.port[${k}].tangent.${axis}`));
-    if (!y || !z) return NOTHING;
-    roll.forEach((angle, i) => {
-      const against = angle - Math.atan2(z[i], y[i]), gap = level * Math.cos(against) - 0.5 * robot.along * Math.abs(Math.sin(against));
-      if (!least || gap < least.gap) least = { gap, i };
-    });
+  for (const t of times) {
+    const gap = clearance(model, t)?.least;
+    if (Number.isFinite(gap) && !(gap >= least?.gap)) least = { gap, t };
   }
-  const small = `of ${fixed(1e3 * level, 0)} mm when level; at ${fixed(model.time[least.i], 2)} s`;
+  if (!least) return NOTHING;
+  const small = `of ${fixed(1e3 * level, 0)} mm over a straight line; at ${fixed(least.t, 2)} s`;
   return { value: `${fixed(1e3 * least.gap, 0)} mm`, small, used: 1 - least.gap / level };
 }
 
