@@ -121,7 +121,7 @@ class WhatIf {
     this.app.show(this.home, this.home === this.app.original ? '' : this.home.head.opened);
   }
 
-  state() { return { wishes: { ...this.wishes }, start: this.starts?.indexOf(this.start) ?? -1, changed: this.changed, said: this.said.textContent, ms: this.ms ?? null }; }
+  state() { return { wishes: { ...this.wishes }, start: this.starts?.indexOf(this.start) ?? -1, changed: this.changed, said: this.said.textContent, ms: this.ms ?? null, solving_ms: this.solving ?? null }; }
 
   // Solve what is wished and show it. Returns whether it is shown: a newer wish, or a failure, keeps it from that.
   async solve() {
@@ -138,7 +138,7 @@ class WhatIf {
       return false;
     }
     this.app.show(this.model(start, wishes, answer), 'what if');
-    this.ms = performance.now() - began;
+    Object.assign(this, { ms: performance.now() - began, solving: answer.ms });
     this.#say(this.#words(start, wishes));
     return true;
   }
