@@ -28,10 +28,11 @@ from orchestrator.landing.monolithic.entry import (
 from orchestrator.landing.monolithic.solve import Integrator, shown_of
 from orchestrator.landing.monolithic.starts import packed, start_of
 from orchestrator.report.page.whatif import whatif_of
+from orchestrator.runs.job import Job, make
 from orchestrator.runs.systems import LandingSystem
 from orchestrator.runs.whatif import step_of
 from orchestrator.scenario.inertia import goes_with_mass
-from tests.scenarios import ROOT
+from tests.scenarios import ROOT, SCENARIOS
 from tests.what_if import (
     FLAGSHIP,
     HELD,
@@ -226,6 +227,15 @@ def test_long_runs_leave_other_starts(tmp_path: Path):
 
 def test_a_short_run_leaves_its_own_alone(tmp_path: Path):
     assert len(left(tmp_path / "run", system_of(), others=True)["starts"]) == 1
+
+
+def test_a_run_of_a_sweep_leaves_its_start(tmp_path: Path):
+    job = Job(
+        str(SCENARIOS / f"{FLAGSHIP}.toml"), {"simulation.stop_time": 0.04, "landing.position": 50.0}, estimate=False
+    )
+    make(job, tmp_path)
+    about = json.loads((tmp_path / job.key / "start.json").read_text(encoding="utf-8"))
+    assert [start["position"] for start in about["starts"]] == [50.0] and about["end"] == 0.04
 
 
 def test_why_there_is_none_is_said(tmp_path: Path):
