@@ -6,9 +6,9 @@ import { dirname, join } from 'node:path';
 import { fileURLToPath } from 'node:url';
 
 const HERE = dirname(fileURLToPath(import.meta.url));
-const SOURCES = join(HERE, 'src'),
-  OUT = join(HERE, 'dist'),
-  PACKAGES = join(HERE, 'node_modules');
+const SOURCES = join(HERE, 'src');
+const OUT = join(HERE, 'dist');
+const PACKAGES = join(HERE, 'node_modules');
 const BROWSERS = ['chrome111', 'firefox113', 'safari16.4'];
 const OUTPUTS = ['page.js', 'page.css', 'page.html', 'licences.txt', 'worker.js'];
 
@@ -72,8 +72,8 @@ async function style(build) {
 }
 
 function licence(name) {
-  const folder = join(PACKAGES, name),
-    file = readdirSync(folder).find(f => /^licen[cs]e(\.|$)/i.test(f));
+  const folder = join(PACKAGES, name);
+  const file = readdirSync(folder).find(f => /^licen[cs]e(\.|$)/i.test(f));
   if (!file) throw new Error(`${folder}: no licence file; what is bundled must carry its licence`);
   const { version, license } = json(join(folder, 'package.json'));
   return `${name} ${version} (${license})\n\n${text(join(folder, file)).trim()}\n`;

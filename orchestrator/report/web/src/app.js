@@ -49,8 +49,8 @@ export class App {
 
   // Where scripts draw: the body's own places, made where it has none. A graph has plots alone.
   #places() {
-    const found = id => document.getElementById(id),
-      main = document.getElementById('page');
+    const found = id => document.getElementById(id);
+    const main = document.getElementById('page');
     const make = (id, parent) =>
       found(id) ?? parent.appendChild(Object.assign(document.createElement('section'), { id, className: 'card' }));
     const work = document.querySelector('.work') ?? document.createElement('div');
@@ -58,8 +58,8 @@ export class App {
       work.className = 'work';
       (document.querySelector('.tiles') ?? main.querySelector('header') ?? main.firstElementChild).after(work);
     }
-    const stage = make('stage', work),
-      plots = make('plots', work);
+    const stage = make('stage', work);
+    const plots = make('plots', work);
     this.places = { work, stage, plots };
     return { stage, plots, map: this.model.head.map ? make('map', main) : found('map') };
   }

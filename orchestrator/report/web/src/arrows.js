@@ -10,8 +10,8 @@ import {
   Vector3,
 } from 'three';
 
-const UP = new Vector3(0, 1, 0),
-  HEAD = 0.11; // m, of an arrow of size 1
+const UP = new Vector3(0, 1, 0);
+const HEAD = 0.11; // m, of an arrow of size 1
 
 export class Arrows {
   #matrix = new Matrix4();
@@ -41,8 +41,8 @@ export class Arrows {
     if (this.count >= this.most || !(length > 0.02 * size)) return;
     this.#direction.set(...vector).normalize();
     this.#turn.setFromUnitVectors(UP, this.#direction);
-    const head = Math.min(HEAD * size, 0.6 * length),
-      thick = Math.min(size, head / HEAD);
+    const head = Math.min(HEAD * size, 0.6 * length);
+    const thick = Math.min(size, head / HEAD);
     this.#put(this.shafts, from, 0, [thick, length - head, thick], colour);
     this.#put(this.heads, from, length - head, [thick, thick, thick], colour);
     this.count++;

@@ -18,8 +18,8 @@ const STRANDS = 8;
 
 // Arc lengths with a ring: the nodes, every `step`, and dense where robots land.
 export function ringsAt(arc, focus, step) {
-  const [first, last] = [arc[0], arc[arc.length - 1]],
-    found = new Set([...arc]);
+  const [first, last] = [arc[0], arc[arc.length - 1]];
+  const found = new Set([...arc]);
   for (let s = first; s < last; s += step) found.add(s);
   for (const centre of focus) {
     for (let d = 0; d < 5; d += 0.015 + 0.06 * d) {
@@ -32,11 +32,11 @@ export function ringsAt(arc, focus, step) {
 
 // One tile of the surface, `rows` strands high; `paint` gives a grey (or a normal) for the place across a strand.
 function tile(paint) {
-  const size = 64,
-    canvas = document.createElement('canvas');
+  const size = 64;
+  const canvas = document.createElement('canvas');
   canvas.width = canvas.height = size;
-  const pen = canvas.getContext('2d'),
-    image = pen.createImageData(size, size);
+  const pen = canvas.getContext('2d');
+  const image = pen.createImageData(size, size);
   for (let y = 0; y < size; y++) {
     for (let x = 0; x < size; x++) {
       // strands run diagonally over the tile, so that it repeats in both directions
@@ -71,10 +71,10 @@ export class Cable {
   }
 
   #geometry() {
-    const n = this.s.length,
-      row = SIDES + 1,
-      index = [],
-      uv = new Float32Array(2 * n * row);
+    const n = this.s.length;
+    const row = SIDES + 1;
+    const index = [];
+    const uv = new Float32Array(2 * n * row);
     const pitch = (2 * this.radius * LAY) / STRANDS; // of the pattern along the line
     for (let i = 0, o = 0; i < n; i++) {
       for (let k = 0; k <= SIDES; k++) {
@@ -104,13 +104,13 @@ export class Cable {
   }
 
   #skin(eye, perPixel) {
-    const { position, normal } = this.mesh.geometry.attributes,
-      c = this.centre,
-      last = this.s.length - 1;
+    const { position, normal } = this.mesh.geometry.attributes;
+    const c = this.centre;
+    const last = this.s.length - 1;
     for (let i = 0; i <= last; i++) {
-      const o = 3 * i,
-        l = 3 * Math.max(i - 1, 0),
-        r = 3 * Math.min(i + 1, last);
+      const o = 3 * i;
+      const l = 3 * Math.max(i - 1, 0);
+      const r = 3 * Math.min(i + 1, last);
       const frame = across(c[r] - c[l], c[r + 1] - c[l + 1], c[r + 2] - c[l + 2]);
       const distance = Math.hypot(c[o] - eye.x, c[o + 1] - eye.y, c[o + 2] - eye.z);
       ring(
@@ -133,10 +133,10 @@ export class Cable {
 
 // Two unit vectors across a tangent: one as level as can be, and the other.
 function across(x, y, z) {
-  const level = Math.hypot(x, y) || 1e-12,
-    length = Math.hypot(level, z);
-  const a = [y / level, -x / level, 0],
-    t = [x / length, y / length, z / length];
+  const level = Math.hypot(x, y) || 1e-12;
+  const length = Math.hypot(level, z);
+  const a = [y / level, -x / level, 0];
+  const t = [x / length, y / length, z / length];
   return [a, [a[1] * t[2], -a[0] * t[2], a[0] * t[1] - a[1] * t[0]]];
 }
 

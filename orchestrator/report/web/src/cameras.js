@@ -1,10 +1,10 @@
 // Four views of a landing, and how heights and robot are scaled in each. Numbers in m, for a robot of 1.25 m.
 
-const USUAL = 1.25,
-  STEPS = [1, 2, 5, 10, 20];
+const USUAL = 1.25;
+const STEPS = [1, 2, 5, 10, 20];
 export const FIELD = 38; // degrees, vertical
 
-// Factor for heights in the span view: as large as the picture bears, never so that the sag looks like a fifth of the span.
+// Factor for heights in the span view: at most 10, and never so large that the sag looks like a fifth of the span.
 export function spanHeights(length, sag) {
   const most = (0.2 * length) / Math.max(sag, 1e-6);
   return Math.max(1, ...STEPS.filter(k => k <= Math.min(most, 10)));
@@ -21,8 +21,8 @@ export function camera(name, { at: [x, y, z], low, high, reach, hangs, span, sag
   if (name === 'wheel')
     return { ...close, follow: true, target: [x, y, z + 0.03], eye: [x + 0.5, y - 0.62, z + 0.2] };
   if (name === 'span' && span) return wholeSpan(span, sag, reach, aspect);
-  const tangent = Math.tan((FIELD * Math.PI) / 360),
-    middle = (low + high) / 2;
+  const tangent = Math.tan((FIELD * Math.PI) / 360);
+  const middle = (low + high) / 2;
   const distance = Math.max((high - low) / 2 / tangent, (0.62 * reach) / (tangent * aspect)) + 0.35 * reach;
   const ways = name === 'side' ? [1, 0, 0] : [0.8, -0.5, hangs ? 0.33 : 0.3];
   return { ...close, target: [x, y, middle], eye: [x, y, middle].map((v, c) => v + distance * ways[c]) };
@@ -30,11 +30,11 @@ export function camera(name, { at: [x, y, z], low, high, reach, hangs, span, sag
 
 // The whole line fits, whatever the window: distance from the narrower of the two field angles.
 function wholeSpan({ left, right, length }, sag, reach, aspect) {
-  const heights = spanHeights(length, sag),
-    size = spanSize(length, reach),
-    tangent = Math.tan((FIELD * Math.PI) / 360);
-  const middle = [0, 1, 2].map(c => (left[c] + right[c]) / 2),
-    deep = heights * sag + reach * size;
+  const heights = spanHeights(length, sag);
+  const size = spanSize(length, reach);
+  const tangent = Math.tan((FIELD * Math.PI) / 360);
+  const middle = [0, 1, 2].map(c => (left[c] + right[c]) / 2);
+  const deep = heights * sag + reach * size;
   const rise = Math.abs(right[2] - left[2]);
   const far = 1.1 * Math.max(length / 2 / (tangent * aspect), (deep + rise) / 1.5 / tangent);
   const target = [middle[0], middle[1], middle[2] - 0.5 * deep];

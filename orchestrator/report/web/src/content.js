@@ -32,7 +32,9 @@ export class Content {
     this.palette = { ...materials(), ...supportPalette(), strands: strandMaterial() };
     this.dashed = new LineDashedMaterial();
     this.path = new LineBasicMaterial();
-    this.pale = new MeshPhongMaterial({ transparent: true, opacity: 0.35, depthWrite: false });
+    // where both are in the same place the run is seen, not a mixture
+    const behind = { polygonOffset: true, polygonOffsetFactor: 2, polygonOffsetUnits: 8 };
+    this.pale = new MeshPhongMaterial({ transparent: true, opacity: 0.4, depthWrite: false, ...behind });
   }
 
   show(model) {

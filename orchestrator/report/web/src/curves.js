@@ -1,7 +1,7 @@
 // Numbers behind the plots: what a panel shows in its unit, differences, and the range of its axis. No DOM.
 
-const MINUS_SIGN = '−',
-  SUPERSCRIPT = '⁰¹²³⁴⁵⁶⁷⁸⁹';
+const MINUS_SIGN = '−';
+const SUPERSCRIPT = '⁰¹²³⁴⁵⁶⁷⁸⁹';
 
 const firstFinite = values => {
   for (const x of values) if (Number.isFinite(x)) return x;
@@ -43,8 +43,8 @@ const resampled = (model, name, times) => Array.from(times, t => (t > model.end 
 
 // Labels of the runs that carry the signal too, the reference first.
 function others(model, name) {
-  const end = `/${name}`,
-    found = [];
+  const end = `/${name}`;
+  const found = [];
   for (const key of Object.keys(model.arrays)) {
     if (!key.startsWith(model.prefix) || !key.endsWith(end)) continue;
     const label = key.slice(model.prefix.length, -end.length);
@@ -54,19 +54,19 @@ function others(model, name) {
 }
 
 function differences(model, panel, signal) {
-  const plain = { factor: panel.factor },
-    exact = model.get(`difference/${signal.name}`);
+  const plain = { factor: panel.factor };
+  const exact = model.get(`difference/${signal.name}`);
   if (exact)
     return [{ ...signal, values: shown(model.atOwnTimes(`difference/${signal.name}`), plain), kind: 'difference' }];
   if (!model.has(`reference/${signal.name}`)) return [];
-  const own = model.get(signal.name),
-    theirs = model.atOwnTimes(`reference/${signal.name}`);
+  const own = model.get(signal.name);
+  const theirs = model.atOwnTimes(`reference/${signal.name}`);
   return [{ ...signal, values: minus(shown(own, plain), shown(theirs, plain)), kind: 'difference' }];
 }
 
 export function extent(lists) {
-  let low = Infinity,
-    high = -Infinity;
+  let low = Infinity;
+  let high = -Infinity;
   for (const values of lists) {
     for (const x of values) {
       if (x === null || x === undefined) continue;

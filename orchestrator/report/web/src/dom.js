@@ -22,8 +22,8 @@ const IN_MEMORY = { willReadFrequently: true };
 
 // Make something whose canvases are to be drawn in memory, although it does not ask for that itself (uPlot).
 export function inMemory(make) {
-  const prototype = HTMLCanvasElement.prototype,
-    { getContext } = prototype;
+  const prototype = HTMLCanvasElement.prototype;
+  const { getContext } = prototype;
   prototype.getContext = function context(kind, options) {
     return getContext.call(this, kind, { ...options, ...IN_MEMORY });
   };
@@ -36,9 +36,9 @@ export function inMemory(make) {
 
 // A canvas of as many pixels as its place on the screen has; returns what is needed to draw in CSS pixels.
 export function pixels(canvas) {
-  const ratio = Math.min(devicePixelRatio || 1, 2),
-    width = canvas.clientWidth,
-    height = canvas.clientHeight;
+  const ratio = Math.min(devicePixelRatio || 1, 2);
+  const width = canvas.clientWidth;
+  const height = canvas.clientHeight;
   if (!width || !height) return null;
   const [w, h] = [Math.round(width * ratio), Math.round(height * ratio)];
   if (canvas.width !== w || canvas.height !== h) {

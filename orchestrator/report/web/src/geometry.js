@@ -20,9 +20,9 @@ export function toBody(pose, p, matrix = rotation(pose.angles)) {
 
 // Unit vector of an axle in B: along x (or `axle`), tilted about y, then turned about z.
 export function axle(wheel) {
-  const [x, y, z] = wheel.axle ?? [1, 0, 0],
-    tilt = wheel.axle_tilt ?? 0,
-    yaw = wheel.axle_yaw ?? 0;
+  const [x, y, z] = wheel.axle ?? [1, 0, 0];
+  const tilt = wheel.axle_tilt ?? 0;
+  const yaw = wheel.axle_yaw ?? 0;
   const [a, c] = [x * Math.cos(tilt) + z * Math.sin(tilt), z * Math.cos(tilt) - x * Math.sin(tilt)];
   const out = [a * Math.cos(yaw) - y * Math.sin(yaw), a * Math.sin(yaw) + y * Math.cos(yaw), c];
   const length = Math.hypot(...out) || 1;
@@ -32,8 +32,8 @@ export function axle(wheel) {
 // Half section of a V-groove wheel, [radius, axial] from one face to the other. The groove's apex lies on the axis
 // of symmetry, (width / 2) / tan(angle / 2) below the rim, never inside the hub.
 export function grooveSection({ radius, groove_angle: angle, width }, flange = 0.08 * radius, hub = 0.16 * radius) {
-  const half = width / 2,
-    apex = Math.max(radius - half / Math.tan(angle / 2), hub + 0.05 * radius);
+  const half = width / 2;
+  const apex = Math.max(radius - half / Math.tan(angle / 2), hub + 0.05 * radius);
   return [
     [hub, -half - flange],
     [0.94 * radius, -half - flange],
@@ -49,9 +49,9 @@ export function grooveSection({ radius, groove_angle: angle, width }, flange = 0
 
 // Where rotors stand: four in the corners of the robot's outline. Radius, centres in B.
 export function rotors({ across, along, rotor_plane: z = 0 }) {
-  const radius = 0.19 * Math.min(across, along),
-    x = across / 2 - radius,
-    y = along / 2 - radius;
+  const radius = 0.19 * Math.min(across, along);
+  const x = across / 2 - radius;
+  const y = along / 2 - radius;
   return {
     radius,
     centres: [
@@ -65,23 +65,23 @@ export function rotors({ across, along, rotor_plane: z = 0 }) {
 
 const SAMPLES = 48;
 
-// Least distance between the rotors' plane and the line as it is bent, along z_B over the robot's length: {least, before,
-// after} in m, towards the left and the right support. Negative: the line cuts the plane. Null where it cannot be said.
+// Least distance between the rotors' plane and the line as it is bent, along z_B over the robot's length: {least,
+// before, after} in m, towards the left and the right support. Negative: the line cuts the plane. Null: not known.
 // The same as orchestrator/report/page/gap.py.
 export function clearance(model, t, prefix = '') {
-  const { robot, line } = model.head,
-    pose = model.pose(t, prefix);
+  const { robot, line } = model.head;
+  const pose = model.pose(t, prefix);
   const nodes = line && model.line(t, prefix + model.linePrefix);
   if (!robot?.along || !pose || !nodes) return null;
-  const sign = robot.layout === 'bottom' ? -1 : 1,
-    half = robot.along / 2,
-    matrix = rotation(pose.angles);
-  const middle = contactArc(model, t, prefix),
-    found = { before: Infinity, after: Infinity },
-    p = [0, 0, 0];
+  const sign = robot.layout === 'bottom' ? -1 : 1;
+  const half = robot.along / 2;
+  const matrix = rotation(pose.angles);
+  const middle = contactArc(model, t, prefix);
+  const found = { before: Infinity, after: Infinity };
+  const p = [0, 0, 0];
   const take = (y, z) => {
-    const gap = sign * (z - (robot.rotor_plane ?? 0)),
-      side = y < 0 ? 'before' : 'after';
+    const gap = sign * (z - (robot.rotor_plane ?? 0));
+    const side = y < 0 ? 'before' : 'after';
     if (gap < found[side]) found[side] = gap;
   };
   let last = null;
@@ -102,8 +102,8 @@ export function clearance(model, t, prefix = '') {
 export function touch(model, t, prefix, k) {
   const [point, tangent] = ['position', 'tangent'].map(what => model.vector(`${prefix}cable.port[${k}].${what}`, t));
   if ([...point, ...tangent].every(Number.isFinite)) return { point, tangent };
-  const nodes = model.line(t, prefix + model.linePrefix),
-    s = model.at(`${prefix}contact${k}.cable.s`, t);
+  const nodes = model.line(t, prefix + model.linePrefix);
+  const s = model.at(`${prefix}contact${k}.cable.s`, t);
   if (nodes) hermite(nodes, Number.isFinite(s) ? s : contactArc(model, t, prefix), point, tangent);
   return { point, tangent };
 }
@@ -117,9 +117,9 @@ export function contactArc(model, t, prefix = '') {
 
 // Angle that a wheel has turned about its axle relative to the body, at every communication point.
 export function spin(model, k) {
-  const time = model.time,
-    n = time.length,
-    out = new Float64Array(n);
+  const time = model.time;
+  const n = time.length;
+  const out = new Float64Array(n);
   const names = ['x', 'y', 'z'].map(c => [
     `robot.wheel[${k}].angular_velocity.${c}`,
     `robot.body.angular_velocity.${c}`,
@@ -132,8 +132,8 @@ export function spin(model, k) {
   if (parts.some(p => p.some(v => !v))) return out;
   const rate = i => parts.reduce((sum, [w, b, a]) => sum + (w[i] - b[i]) * a[i], 0);
   for (let i = 1, last = rate(0); i < n; i++) {
-    const now = rate(i),
-      turned = ((last + now) / 2) * (time[i] - time[i - 1]);
+    const now = rate(i);
+    const turned = ((last + now) / 2) * (time[i] - time[i - 1]);
     out[i] = out[i - 1] + (Number.isFinite(turned) ? turned : 0);
     last = now;
   }

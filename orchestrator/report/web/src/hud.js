@@ -37,8 +37,8 @@ function shown(model, t, { name, factor = 1, unit = '', digits = 2, from_start: 
 function gap(model, t, { digits = 0, factor = MILLI, unit = 'mm' }) {
   const found = clearance(model, t);
   if (!found) return '–';
-  const difference = factor * (found.before - found.after),
-    side = difference < 0 ? '◂ ' : ' ▸';
+  const difference = factor * (found.before - found.after);
+  const side = difference < 0 ? '◂ ' : ' ▸';
   const text = `${fixed(factor * found.least, digits)} ${unit}`;
   if (!(Math.abs(difference) >= 1)) return text;
   return difference < 0 ? side + text : text + side;

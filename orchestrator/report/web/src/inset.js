@@ -3,15 +3,15 @@ import { css, FONT, pixels } from './dom.js';
 import { contactArc } from './geometry.js';
 import { hermite } from './model.js';
 
-const SAMPLES = 96,
-  MARGIN = 14,
-  TOP = 24,
-  MOST = 60;
+const SAMPLES = 96;
+const MARGIN = 14;
+const TOP = 24;
+const MOST = 60;
 
 const samples = nodes => {
-  const out = [],
-    first = nodes.s[0],
-    length = nodes.s[nodes.s.length - 1] - first;
+  const out = [];
+  const first = nodes.s[0];
+  const length = nodes.s[nodes.s.length - 1] - first;
   for (let i = 0; i <= SAMPLES; i++) out.push(hermite(nodes, first + (length * i) / SAMPLES));
   return out;
 };
@@ -29,8 +29,8 @@ export class Inset {
     if (!this.band) return;
     const rest = model.line(model.start);
     this.rest = rest && samples(rest);
-    const lows = [...this.band.low].filter(Number.isFinite),
-      highs = [...this.band.high].filter(Number.isFinite);
+    const lows = [...this.band.low].filter(Number.isFinite);
+    const highs = [...this.band.high].filter(Number.isFinite);
     this.range = [Math.min(...lows), Math.max(...highs)];
     const length = Math.abs(this.band.y[this.band.y.length - 1] - this.band.y[0]);
     this.canvas.setAttribute(
@@ -55,11 +55,11 @@ export class Inset {
   }
 
   #scale({ width, height }) {
-    const { y } = this.band,
-      [low, high] = this.range,
-      length = Math.abs(y[y.length - 1] - y[0]) || 1;
-    const kx = (width - 2 * MARGIN) / length,
-      kz = Math.min((height - TOP - MARGIN) / (high - low || 1e-9), MOST * kx);
+    const { y } = this.band;
+    const [low, high] = this.range;
+    const length = Math.abs(y[y.length - 1] - y[0]) || 1;
+    const kx = (width - 2 * MARGIN) / length;
+    const kz = Math.min((height - TOP - MARGIN) / (high - low || 1e-9), MOST * kx);
     const zero = Math.min(y[0], y[y.length - 1]);
     return { x: p => MARGIN + (p - zero) * kx, z: p => TOP + (high - p) * kz, ratio: kz / kx, length };
   }

@@ -4,11 +4,12 @@ import { css, element, fixed } from './dom.js';
 import { edges, outline, shade } from './mapping.js';
 
 const NS = 'http://www.w3.org/2000/svg';
-const LEFT = 76,
-  RIGHT = 16,
-  TOP = 12,
-  BOTTOM = 50,
-  WIDTH = 900; // of the drawing, in its own units
+const LEFT = 76;
+const RIGHT = 16;
+const TOP = 12;
+const BOTTOM = 50; // px around the cells
+const NARROWEST = 320;
+const WIDEST = 1100;
 const LETTERS = 'abcdefghijklmnopqrstuvwxyz';
 
 const svg = (tag, attributes = {}, text = null) => {
@@ -43,6 +44,7 @@ export class SweepMap {
     this.limits = this.map?.limits ?? [...new Set(this.cells.map(c => c.limit).filter(Boolean))].sort();
     for (const cell of this.cells) cell.words = this.#words(cell);
     this.#frame();
+    new ResizeObserver(() => this.map && this.host.clientWidth !== this.width && this.draw()).observe(this.host);
     app.page.map = { cells: this.cells, open: i => this.#open(i), select: i => this.#select(i) };
   }
 
@@ -79,17 +81,19 @@ export class SweepMap {
   }
 
   draw() {
-    const { x, y } = this.map,
-      kept = this.chosen ?? 0;
-    const rows = y?.values.length ?? 1,
-      height = TOP + BOTTOM + Math.min(420, Math.max(70, rows * 44));
-    const box = { x0: LEFT, x1: WIDTH - RIGHT, y0: TOP, y1: height - BOTTOM };
+    const { x, y } = this.map;
+    const kept = this.chosen ?? 0;
+    const rows = y?.values.length ?? 1;
+    const height = TOP + BOTTOM + Math.min(420, Math.max(70, rows * 44));
+    const width = Math.min(WIDEST, Math.max(NARROWEST, this.host.clientWidth || WIDEST));
+    this.width = this.host.clientWidth;
+    const box = { x0: LEFT, x1: width - RIGHT, y0: TOP, y1: height - BOTTOM };
     this.ex = edges(x);
     this.ey = y ? edges(y) : [0, 1];
     this.px = v => box.x0 + ((v - this.ex[0]) / (this.ex[this.ex.length - 1] - this.ex[0])) * (box.x1 - box.x0);
     this.py = v => box.y1 - ((v - this.ey[0]) / (this.ey[this.ey.length - 1] - this.ey[0])) * (box.y1 - box.y0);
     const drawing = svg('svg', {
-      viewBox: `0 0 ${WIDTH} ${height}`,
+      viewBox: `0 0 ${width} ${height}`,
       role: 'group',
       'aria-label': `${this.measure.label}: map of ${this.cells.length} landings`,
     });
@@ -108,9 +112,9 @@ export class SweepMap {
   }
 
   #cell(drawing, cell, i) {
-    const value = cell[this.measure.key],
-      at = this.#box(cell),
-      known = Number.isFinite(value);
+    const value = cell[this.measure.key];
+    const at = this.#box(cell);
+    const known = Number.isFinite(value);
     const { fill, ink } = shade(value, this.measure.kind ?? 'margin');
     const rect = svg('rect', {
       ...at,
@@ -132,8 +136,8 @@ export class SweepMap {
 
   // The number where there is room, and a letter for the limit that binds.
   #letters(drawing, cell, at, known, ink) {
-    const letter = LETTERS[this.limits.indexOf(cell.limit)] ?? '',
-      { factor = 1, digits = 0, key } = this.measure;
+    const letter = LETTERS[this.limits.indexOf(cell.limit)] ?? '';
+    const { factor = 1, digits = 0, key } = this.measure;
     const number = known && at.width > 42 ? fixed(factor * cell[key], digits) : '';
     const text = known ? [number, letter].filter(Boolean).join(' ') : '×';
     const size = at.width > 42 ? 13 : 11;
@@ -154,11 +158,7 @@ export class SweepMap {
 
   // Between landings that are safe and those that are not.
   #outline(drawing) {
-    const isSafe = cell => (cell.verdict ? cell.verdict === 'safe' : cell.margin >= 0);
-    const lines = outline(
-      this.cells.filter(c => !c.box && Number.isFinite(c.margin)),
-      isSafe,
-    ).map(([a, b]) => `M${this.#corner(a)}L${this.#corner(b)}`);
+    const lines = outline(this.cells).map(([a, b]) => `M${this.#corner(a)}L${this.#corner(b)}`);
     drawing.append(svg('path', { d: lines.join(''), class: 'map-outline' }));
   }
 
@@ -178,8 +178,8 @@ export class SweepMap {
   }
 
   #legend() {
-    const { label, unit = '', factor = 1, kind = 'margin' } = this.measure,
-      stops = kind === 'probability' ? [0, 0.5, 0.9, 1] : [-0.5, -0.01, 0.01, 0.5, 1];
+    const { label, unit = '', factor = 1, kind = 'margin' } = this.measure;
+    const stops = kind === 'probability' ? [0, 0.5, 0.9, 1] : [-0.5, -0.1, 0.1, 0.5, 1];
     const patch = value =>
       element(
         'span',
@@ -246,12 +246,12 @@ export class SweepMap {
   #neighbour(cell, [dx, dy]) {
     const distance = c => {
       const [x, y] = [(c.x - cell.x) * (dx || dy * 0), ((c.y ?? 0) - (cell.y ?? 0)) * dy];
-      const ahead = dx ? x : y,
-        aside = dx ? Math.abs((c.y ?? 0) - (cell.y ?? 0)) : Math.abs(c.x - cell.x);
+      const ahead = dx ? x : y;
+      const aside = dx ? Math.abs((c.y ?? 0) - (cell.y ?? 0)) : Math.abs(c.x - cell.x);
       return ahead > 0 ? ahead + 100 * aside : Infinity;
     };
-    const all = this.cells.map(distance),
-      least = Math.min(...all);
+    const all = this.cells.map(distance);
+    const least = Math.min(...all);
     return Number.isFinite(least) ? all.indexOf(least) : -1;
   }
 
@@ -280,8 +280,8 @@ const named = (axis, i) => {
 
 // Ticks at the values, fewer where they would run together: [[place, words]].
 function ticks(axis, cells, most) {
-  const n = axis.values.length,
-    every = Math.max(1, Math.ceil(n / Math.max(most, 1)));
+  const n = axis.values.length;
+  const every = Math.max(1, Math.ceil(n / Math.max(most, 1)));
   const words = i => String(axis.labels?.[i] ?? +Number(axis.values[i]).toPrecision(5));
   return axis.values.map((_, i) => [(cells[i] + cells[i + 1]) / 2, words(i)]).filter((_, i) => i % every === 0);
 }

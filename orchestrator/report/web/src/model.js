@@ -5,8 +5,8 @@ export const AXES = ['x', 'y', 'z'];
 
 function fromBase64(text) {
   if (Uint8Array.fromBase64) return Uint8Array.fromBase64(text);
-  const raw = atob(text),
-    out = new Uint8Array(raw.length);
+  const raw = atob(text);
+  const out = new Uint8Array(raw.length);
   for (let i = 0; i < raw.length; i++) out[i] = raw.charCodeAt(i);
   return out;
 }
@@ -20,16 +20,16 @@ export async function unpack(text, how = 'gzip') {
 }
 
 function view(buffer, { offset, shape, type }) {
-  const kind = TYPES[type ?? 'f4'],
-    count = shape.reduce((a, b) => a * b, 1);
+  const kind = TYPES[type ?? 'f4'];
+  const count = shape.reduce((a, b) => a * b, 1);
   if (offset % kind.BYTES_PER_ELEMENT === 0) return new kind(buffer, offset, count);
   return new kind(buffer.slice(offset, offset + count * kind.BYTES_PER_ELEMENT));
 }
 
 export async function read(document) {
   const head = JSON.parse(document.getElementById('head').textContent);
-  const element = document.getElementById('blob'),
-    text = element?.textContent ?? '';
+  const element = document.getElementById('blob');
+  const text = element?.textContent ?? '';
   const buffer = text.trim() ? await unpack(text, head.packed) : new ArrayBuffer(0);
   if (element) element.textContent = ''; // megabytes that nobody reads twice
   const arrays = {};
@@ -42,8 +42,8 @@ export function locate(times, t) {
   const last = times.length - 1;
   if (last < 1 || !(t > times[0])) return [0, 0];
   if (t >= times[last]) return [last - 1, 1];
-  let low = 0,
-    high = last;
+  let low = 0;
+  let high = last;
   while (high - low > 1) {
     const middle = (low + high) >> 1;
     if (times[middle] <= t) low = middle;
@@ -54,23 +54,23 @@ export function locate(times, t) {
 
 // Linear interpolation; a value that is not finite beside one that is gives way to it.
 export function interpolate(values, i, f) {
-  const a = values[i],
-    b = values[Math.min(i + 1, values.length - 1)];
+  const a = values[i];
+  const b = values[Math.min(i + 1, values.length - 1)];
   if (f === 0 || !Number.isFinite(b)) return a;
   return f === 1 || !Number.isFinite(a) ? b : a * (1 - f) + b * f;
 }
 
 // Point (and tangent) of an ANCF line at arc length s: cubic Hermite between its nodes, which is its exact shape.
 export function hermite(line, s, point = [0, 0, 0], tangent = null) {
-  const { s: arc, position: p, slope: d } = line,
-    [i] = locate(arc, s),
-    h = arc[i + 1] - arc[i];
-  const u = Math.min(Math.max((s - arc[i]) / h, 0), 1),
-    v = 1 - u;
-  const a = v * v * (1 + 2 * u),
-    b = u * v * v * h,
-    c = u * u * (3 - 2 * u),
-    e = -u * u * v * h;
+  const { s: arc, position: p, slope: d } = line;
+  const [i] = locate(arc, s);
+  const h = arc[i + 1] - arc[i];
+  const u = Math.min(Math.max((s - arc[i]) / h, 0), 1);
+  const v = 1 - u;
+  const a = v * v * (1 + 2 * u);
+  const b = u * v * v * h;
+  const c = u * u * (3 - 2 * u);
+  const e = -u * u * v * h;
   for (let k = 0, l = 3 * i, r = l + 3; k < 3; k++, l++, r++) {
     point[k] = a * p[l] + b * d[l] + c * p[r] + e * d[r];
     if (tangent) tangent[k] = ((6 * u * v) / h) * (p[r] - p[l]) + v * (1 - 3 * u) * d[l] + u * (3 * u - 2) * d[r];
@@ -79,8 +79,8 @@ export function hermite(line, s, point = [0, 0, 0], tangent = null) {
 }
 
 export const chord = (span, y) => {
-  const [, y0, z0] = span.left,
-    [, y1, z1] = span.right;
+  const [, y0, z0] = span.left;
+  const [, y1, z1] = span.right;
   return z0 + ((z1 - z0) * (y - y0)) / (y1 - y0 || 1);
 };
 
@@ -130,8 +130,8 @@ export class Model {
 
   // A signal at this run's own times, whatever the times it was recorded at.
   atOwnTimes(name) {
-    const values = this.get(name),
-      times = this.timeOf(name);
+    const values = this.get(name);
+    const times = this.timeOf(name);
     if (times === this.time || !values || sameTimes(times, this.time)) return values;
     return Float64Array.from(this.time, t =>
       t > times[times.length - 1] ? NaN : interpolate(values, ...locate(times, t)),
@@ -165,11 +165,11 @@ export class Model {
   line(t, prefix = this.linePrefix) {
     const all = this.#nodes(prefix);
     if (!all) return null;
-    const [i, f] = locate(all.time, t),
-      size = 3 * all.s.length,
-      frames = all.position.length / size;
-    const from = Math.min(i, frames - 1) * size,
-      to = Math.min(i + 1, frames - 1) * size;
+    const [i, f] = locate(all.time, t);
+    const size = 3 * all.s.length;
+    const frames = all.position.length / size;
+    const from = Math.min(i, frames - 1) * size;
+    const to = Math.min(i + 1, frames - 1) * size;
     const mix = a => Float64Array.from({ length: size }, (_, k) => a[from + k] * (1 - f) + a[to + k] * f);
     const found = { s: all.s, position: mix(all.position), slope: mix(all.slope) };
     return found.position.every(Number.isFinite) && found.slope.every(Number.isFinite)
@@ -178,8 +178,8 @@ export class Model {
   }
 
   #lastGood({ s, position, slope }, from) {
-    const size = 3 * s.length,
-      finite = a => a.every(Number.isFinite);
+    const size = 3 * s.length;
+    const finite = a => a.every(Number.isFinite);
     for (let o = from; o >= 0; o -= size) {
       const found = { s, position: position.subarray(o, o + size), slope: slope.subarray(o, o + size) };
       if (finite(found.position) && finite(found.slope)) return found;
@@ -191,9 +191,9 @@ export class Model {
   band(prefix = this.linePrefix) {
     const all = this.#nodes(prefix);
     if (!all) return null;
-    const m = all.s.length,
-      low = new Float64Array(m).fill(Infinity),
-      high = new Float64Array(m).fill(-Infinity);
+    const m = all.s.length;
+    const low = new Float64Array(m).fill(Infinity);
+    const high = new Float64Array(m).fill(-Infinity);
     for (let k = 0, j = 0; k < all.position.length; k += 3, j = (j + 1) % m) {
       const z = all.position[k + 2];
       if (z < low[j]) low[j] = z;

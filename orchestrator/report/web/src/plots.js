@@ -4,10 +4,10 @@ import { axisText, curves, extent, power, powerText, range } from './curves.js';
 import { colour, css, element, fixed, FONT, inMemory } from './dom.js';
 import { locate } from './model.js';
 
-const LEAST = 118,
-  MOST = 200,
-  PHONE = 520,
-  LAST = 20; // px; the last panel carries the axis of time
+const LEAST = 118;
+const MOST = 200;
+const PHONE = 520;
+const LAST = 20; // px; the last panel carries the axis of time
 const CLICK = 4; // px that a click may move
 
 export class Plots {
@@ -84,8 +84,8 @@ export class Plots {
   #content(panel) {
     const original =
       this.model === this.app.original || this.model.prefix !== this.app.original.prefix ? null : this.app.original;
-    const found = curves(this.model, panel, this.mode, original),
-      isDifference = this.mode === 'difference';
+    const found = curves(this.model, panel, this.mode, original);
+    const isDifference = this.mode === 'difference';
     const exponent = isDifference ? power(found.map(c => c.values)) : 0;
     if (exponent) for (const c of found) c.values = c.values.map(x => (x === null ? null : x / 10 ** exponent));
     const unit = `${powerText(exponent)}${panel.unit ?? ''}`.trim();
@@ -107,8 +107,8 @@ export class Plots {
       element('span', { className: 'unit', textContent: content.unit }),
       value,
     );
-    const host = element('div'),
-      figure = element('figure', {}, caption, host);
+    const host = element('div');
+    const figure = element('figure', {}, caption, host);
     figure.setAttribute('aria-label', `${content.title}${content.unit ? `, ${content.unit}` : ''}, over time`);
     figure.setAttribute('role', 'group');
     this.body.append(figure);
@@ -127,8 +127,8 @@ export class Plots {
       ticks: { show: false },
       font: `11px ${FONT}`,
     };
-    const [low, high] = extent(content.curves.map(c => c.values)),
-      limits = range(low, high, content.limits);
+    const [low, high] = extent(content.curves.map(c => c.values));
+    const limits = range(low, high, content.limits);
     return {
       width: 400,
       height: LEAST,
@@ -172,8 +172,8 @@ export class Plots {
   // All panels show the same stretch of time.
   #zoomed(plot) {
     if (this.zooming || !this.list.length) return;
-    const { min, max } = plot.scales.x,
-      whole = min <= this.model.start + 1e-9 && max >= this.model.end - 1e-9;
+    const { min, max } = plot.scales.x;
+    const whole = min <= this.model.start + 1e-9 && max >= this.model.end - 1e-9;
     this.#zoom(whole ? null : [min, max]);
   }
 
@@ -197,8 +197,8 @@ export class Plots {
 
   // Beside the stage the panels share its height.
   #height(width) {
-    const { stage } = this.app.places,
-      beside = !stage.hidden && stage.offsetTop === this.root.offsetTop && stage.offsetHeight;
+    const { stage } = this.app.places;
+    const beside = !stage.hidden && stage.offsetTop === this.root.offsetTop && stage.offsetHeight;
     if (!beside || width < PHONE / 2) return width < PHONE ? LEAST + 12 : 150;
     const room = stage.offsetHeight - this.bar.offsetHeight - LAST - 10 - 22 * this.list.length;
     return Math.min(MOST, Math.max(LEAST, Math.floor(room / this.list.length)));
@@ -216,14 +216,14 @@ export class Plots {
   // Values under the pointer where it is in a plot, else at the time shown.
   #values() {
     for (const { plot, value, content } of this.list) {
-      const hovered = plot.cursor.idx,
-        [i, f] = locate(this.model.time, this.app.t),
-        at = hovered ?? i + Math.round(f);
+      const hovered = plot.cursor.idx;
+      const [i, f] = locate(this.model.time, this.app.t);
+      const at = hovered ?? i + Math.round(f);
       const words = content.curves
         .filter(c => c.kind !== 'reference')
         .map(c => {
-          const x = c.values[at],
-            text = x === null || x === undefined ? '–' : fixed(x, content.digits ?? 2);
+          const x = c.values[at];
+          const text = x === null || x === undefined ? '–' : fixed(x, content.digits ?? 2);
           const name = content.curves.length > 1 && c.label ? `${c.label} ` : '';
           return element('span', {}, element('i', { style: `background:${colour(c.colour)}` }), `${name}${text}`);
         });
@@ -254,10 +254,10 @@ function series({ label, colour: number, dash, kind }) {
 // Dashed lines; a limit beyond the axis is named at the edge that it lies behind.
 function drawLimits(plot, limits) {
   const {
-      ctx: pen,
-      bbox: { left, top, width, height },
-    } = plot,
-    px = devicePixelRatio || 1;
+    ctx: pen,
+    bbox: { left, top, width, height },
+  } = plot;
+  const px = devicePixelRatio || 1;
   pen.save();
   Object.assign(pen, {
     strokeStyle: css('--bad'),
@@ -268,9 +268,9 @@ function drawLimits(plot, limits) {
   });
   pen.setLineDash([6 * px, 4 * px]);
   for (const { at, name } of limits) {
-    const y = plot.valToPos(at, 'y', true),
-      above = y < top,
-      below = y > top + height;
+    const y = plot.valToPos(at, 'y', true);
+    const above = y < top;
+    const below = y > top + height;
     if (!above && !below) {
       pen.beginPath();
       pen.moveTo(left, y);

@@ -9,8 +9,8 @@ export function difference(model) {
   const worst = names =>
     Math.max(
       ...names.map(name => {
-        const ours = model.get(name),
-          theirs = model.atOwnTimes(`reference/${name}`);
+        const ours = model.get(name);
+        const theirs = model.atOwnTimes(`reference/${name}`);
         if (!ours || !theirs) return 0;
         let found = 0;
         for (let i = 0; i < ours.length; i++) {

@@ -51,9 +51,9 @@ class Parts {
 
   // A round bar from a to b.
   bar(material, a, b, radius, sides = 10) {
-    const from = new Vector3(...a),
-      along = new Vector3(...b).sub(from),
-      length = along.length();
+    const from = new Vector3(...a);
+    const along = new Vector3(...b).sub(from);
+    const length = along.length();
     if (length < 1e-6) return;
     const geometry = new CylinderGeometry(radius, radius, length, sides);
     geometry.applyQuaternion(new Quaternion().setFromUnitVectors(UP, along.normalize()));
@@ -69,17 +69,17 @@ class Parts {
 
 // {group, wheels: [turning groups], blades: [groups]}; blades are there only where the rotors have thrust to turn for.
 export function buildRobot(spec, palette) {
-  const parts = new Parts(),
-    group = new Group(),
-    size = complete(spec);
+  const parts = new Parts();
+  const group = new Group();
+  const size = complete(spec);
   const blades = addRotors(parts, size, spec.thrust ? palette : null);
   (size.layout === 'bottom' ? addStandingBody : addHangingBody)(parts, size);
   const wheels = size.wheels.map(wheel => buildWheel(wheel, palette));
   for (const wheel of size.wheels) addFork(parts, wheel, size);
   parts.into(group, palette);
   group.add(...wheels.map(w => w.group), ...blades);
-  const reach = Math.max(size.across, size.along),
-    [low, high] = heightsOf(size);
+  const reach = Math.max(size.across, size.along);
+  const [low, high] = heightsOf(size);
   return { group, wheels: wheels.map(w => w.turning), blades, reach, low, high };
 }
 
@@ -95,10 +95,10 @@ function complete(spec) {
     ...known(w),
   }));
   const size = { across: 0.8, along: 0.8, height: 0.6, rotor_plane: 0, layout: 'top', ...known(spec) };
-  const z = wheels.map(w => w.mount[2]),
-    radius = Math.max(0.02, ...wheels.map(w => w.radius));
-  const top = wheels.length ? Math.max(...z) + radius : 0.2,
-    line = wheels.length ? Math.min(...z) - 0.7 * radius : -0.2;
+  const z = wheels.map(w => w.mount[2]);
+  const radius = Math.max(0.02, ...wheels.map(w => w.radius));
+  const top = wheels.length ? Math.max(...z) + radius : 0.2;
+  const line = wheels.length ? Math.min(...z) - 0.7 * radius : -0.2;
   return { below_line: 0.25, ...size, wheels, radius, top, line };
 }
 
@@ -109,9 +109,9 @@ function heightsOf({ layout, height, below_line: below, line, top, rotor_plane: 
 }
 
 function addRotors(parts, size, palette) {
-  const { radius, centres } = rotors(size),
-    thick = Math.max(0.004, 0.012 * radius * 5),
-    blades = [];
+  const { radius, centres } = rotors(size);
+  const thick = Math.max(0.004, 0.012 * radius * 5);
+  const blades = [];
   for (const [x, y, z] of centres) {
     parts.bar('frame', [0, 0, z - 0.03], [x, y, z - 0.03], 0.014);
     parts.add('frame', new CylinderGeometry(0.026, 0.03, 0.05, 14).rotateX(Math.PI / 2), x, y, z - 0.018);
@@ -133,8 +133,8 @@ function turningBlade(geometry, palette, x, y, z) {
 
 // Hangs from the line: body and battery below the rotors, skids down to the robot's height.
 function addHangingBody(parts, { across, along, height, top, rotor_plane: z }) {
-  const w = (0.085 * Math.min(across, 1.25)) / 1.25 + 0.02,
-    low = Math.min(top - height, z - 0.3);
+  const w = (0.085 * Math.min(across, 1.25)) / 1.25 + 0.02;
+  const low = Math.min(top - height, z - 0.3);
   parts.add('shell', new CapsuleGeometry(w, 0.26 * along, 6, 20).scale(1.25, 1, 0.8), 0, 0, z - 0.07);
   parts.add('frame', new BoxGeometry(1.7 * w, 0.26 * along, 0.09), 0, 0, z - 0.19);
   for (const side of [-1, 1]) {
@@ -147,13 +147,13 @@ function addHangingBody(parts, { across, along, height, top, rotor_plane: z }) {
 
 // Stands on the line: body under the rotors, battery packs on both sides below the line.
 function addStandingBody(parts, { across, along, height, below_line: below, line, rotor_plane: z, wheels, radius }) {
-  const low = line - below,
-    body = 0.6 * (z - line - radius),
-    y = reachOf(wheels, along);
+  const low = line - below;
+  const body = 0.6 * (z - line - radius);
+  const y = reachOf(wheels, along);
   parts.add('shell', new CapsuleGeometry(0.06, y, 6, 20).scale(1.5, 1, 0.75), 0, 0, z - 0.06);
   parts.add('frame', new BoxGeometry(0.09, y + 0.1, 0.035), 0, 0, z - 0.115);
-  const tall = Math.min(0.45 * height, 0.8 * (line - low)),
-    x = Math.max(0.24 * across, 0.14);
+  const tall = Math.min(0.45 * height, 0.8 * (line - low));
+  const x = Math.max(0.24 * across, 0.14);
   for (const side of [-1, 1]) {
     parts.add('frame', new BoxGeometry(0.09, 0.5 * along, tall), side * x, 0, low + tall / 2);
     parts.add('shell', new BoxGeometry(0.094, 0.42 * along, 0.24 * tall), side * x, 0, low + 0.62 * tall);
@@ -168,11 +168,11 @@ const reachOf = (wheels, along) => Math.max(0.3 * along, ...wheels.map(w => 2 * 
 
 // Both sides of a wheel are held: the line passes between the arms.
 function addFork(parts, wheel, { layout, rotor_plane: z }) {
-  const out = wheel.width / 2 + 0.08 * wheel.radius + FORK,
-    [x, y, z0] = wheel.mount,
-    a = axle(wheel);
-  const end = layout === 'bottom' ? z - 0.1 : z - 0.05,
-    arm = layout === 'bottom' ? 0.008 : 0.011;
+  const out = wheel.width / 2 + 0.08 * wheel.radius + FORK;
+  const [x, y, z0] = wheel.mount;
+  const a = axle(wheel);
+  const end = layout === 'bottom' ? z - 0.1 : z - 0.05;
+  const arm = layout === 'bottom' ? 0.008 : 0.011;
   for (const side of [-1, 1]) {
     const hub = [x + side * out * a[0], y + side * out * a[1], z0 + side * out * a[2]];
     const beyond = z0 + Math.sign(z0 - end) * 0.03;
@@ -183,9 +183,9 @@ function addFork(parts, wheel, { layout, rotor_plane: z }) {
 
 // A V-groove wheel: rim as a lathe along the axle; bolts and spokes show how it turns.
 export function buildWheel(wheel, palette) {
-  const { radius, width } = wheel,
-    face = width / 2 + 0.08 * radius,
-    parts = new Parts();
+  const { radius, width } = wheel;
+  const face = width / 2 + 0.08 * radius;
+  const parts = new Parts();
   const section = grooveSection(wheel).map(([r, along]) => new Vector2(r, along));
   parts.add('rim', toCreasedNormals(new LatheGeometry(section, 40), CREASE));
   parts.bar('frame', [0, -face - FORK - 0.012, 0], [0, face + FORK + 0.012, 0], 0.16 * radius + 0.002, 16);
@@ -200,8 +200,8 @@ export function buildWheel(wheel, palette) {
       );
     }
     for (let k = 0; k < 6; k++) {
-      const f = ((k + 0.5) * Math.PI) / 3,
-        r = 0.72 * radius;
+      const f = ((k + 0.5) * Math.PI) / 3;
+      const r = 0.72 * radius;
       parts.add(
         'frame',
         new CylinderGeometry(0.05 * radius, 0.05 * radius, 0.006, 8),
@@ -211,8 +211,8 @@ export function buildWheel(wheel, palette) {
       );
     }
   }
-  const group = new Group(),
-    turning = parts.into(new Group(), palette);
+  const group = new Group();
+  const turning = parts.into(new Group(), palette);
   group.position.set(...wheel.mount);
   group.quaternion.setFromUnitVectors(UP, new Vector3(...axle(wheel)));
   group.add(turning);

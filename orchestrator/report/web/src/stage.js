@@ -54,8 +54,8 @@ export class Stage {
 
   at(t) {
     if (this.gl && !this.root.hidden) this.gl.update(t);
-    const scrub = this.act('scrub'),
-      text = fixed(t, 2);
+    const scrub = this.act('scrub');
+    const text = fixed(t, 2);
     scrub.value = t;
     scrub.setAttribute('aria-valuetext', `${text} seconds`);
     this.root.querySelector('.clock').textContent = `${text} s`;
@@ -79,14 +79,14 @@ export class Stage {
   }
 
   #controls() {
-    const { app } = this,
-      change = (name, action) => {
-        this.act(name).addEventListener('change', event => {
-          action(event.target);
-          this.#marks();
-          app.invalidate();
-        });
-      };
+    const { app } = this;
+    const change = (name, action) => {
+      this.act(name).addEventListener('change', event => {
+        action(event.target);
+        this.#marks();
+        app.invalidate();
+      });
+    };
     this.act('play').onclick = () => app.play(!app.playing);
     this.act('scrub').oninput = event => {
       app.play(false);
@@ -122,8 +122,8 @@ export class Stage {
 
   // How the reference is drawn: not at all, where it is, or with its difference from the run exaggerated.
   #references(model) {
-    const select = this.act('reference'),
-      found = this.gl && model.hasReference;
+    const select = this.act('reference');
+    const found = this.gl && model.hasReference;
     const values = found
       ? [0, ...new Set([1, ...[1, 2, 3, 4, 5, 6].map(n => 10 ** n), this.gl.options.reference])]
       : [0];

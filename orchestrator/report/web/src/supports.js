@@ -23,9 +23,9 @@ export const groundBelow = (length, sag) =>
 
 // Lattice tower of height 1 below its top at the origin, widths in m.
 function lattice() {
-  const lines = [],
-    width = h => 0.55 + 2.1 * h,
-    level = i => -i / STORIES;
+  const lines = [];
+  const width = h => 0.55 + 2.1 * h;
+  const level = i => -i / STORIES;
   const corners = i =>
     [
       [-1, -1],
@@ -34,8 +34,8 @@ function lattice() {
       [-1, 1],
     ].map(([x, y]) => [x * width(i / STORIES), y * width(i / STORIES), level(i)]);
   for (let i = 0; i < STORIES; i++) {
-    const high = corners(i),
-      low = corners(i + 1);
+    const high = corners(i);
+    const low = corners(i + 1);
     for (let k = 0; k < 4; k++) {
       const n = (k + 1) % 4;
       lines.push(high[k], low[k], high[k], low[n], high[n], low[k], low[k], low[n]);
@@ -60,8 +60,8 @@ function arms() {
 }
 
 function insulator(length) {
-  const discs = Math.max(3, Math.round(length / 0.2)),
-    radius = 0.06 * length;
+  const discs = Math.max(3, Math.round(length / 0.2));
+  const radius = 0.06 * length;
   const one = k =>
     new CylinderGeometry(0.4 * radius, radius, (0.5 * length) / discs, 18)
       .rotateX(Math.PI / 2)
@@ -74,8 +74,8 @@ export class Supports {
   constructor(span, palette) {
     this.group = new Group();
     this.bodies = [];
-    const short = span.length < SHORT,
-      string = short ? 0.02 * span.length : 2;
+    const short = span.length < SHORT;
+    const string = short ? 0.02 * span.length : 2;
     for (const end of [span.left, span.right]) {
       const top = end[2] + string;
       const body = short ? this.#post(palette) : segments(lattice(), palette.tower);
@@ -145,8 +145,8 @@ export class Ground {
 
   // Level plane at height z about the middle of a span.
   lay([x, y], z, length) {
-    const size = 12 * Math.max(length, 100),
-      { cell, far } = this.mesh.material.uniforms;
+    const size = 12 * Math.max(length, 100);
+    const { cell, far } = this.mesh.material.uniforms;
     this.mesh.position.set(x, y, z);
     this.mesh.scale.set(size, size, 1);
     cell.value = length < SHORT ? 1 : 20;

@@ -86,9 +86,10 @@ function ofLimit(model, name) {
       small: judged ? 'not finite' : `not judged: ${model.head.not_judged?.[name] ?? 'not known'}`,
       over: Boolean(judged),
     };
-  const { unit, limit, margin, share, time, wheel, verdict } = judged,
-    at = ` at ${fixed(time, 2)} s${wheel ? `, wheel ${wheel}` : ''}`;
-  const small = `limit ${readable(limit, unit)}: ${BEYOND[verdict] ?? 'margin'} ${readable(Math.abs(margin), unit)}${at}`;
+  const { unit, limit, margin, share, time, wheel, verdict } = judged;
+  const at = ` at ${fixed(time, 2)} s${wheel ? `, wheel ${wheel}` : ''}`;
+  const left = `${BEYOND[verdict] ?? 'margin'} ${readable(Math.abs(margin), unit)}`;
+  const small = `limit ${readable(limit, unit)}: ${left}${at}`;
   return { value: readable(Math.abs(judged.worst), unit), small, used: share, over: verdict === 'exceeded' };
 }
 
@@ -111,8 +112,8 @@ function largestForce(model) {
 
 // The least gap between the rotors' plane and the line, over all shapes of the line.
 function leastGap(model) {
-  const times = model.get(`${model.linePrefix}line.time`) ?? [],
-    level = Math.abs(model.head.robot?.line ?? NaN);
+  const times = model.get(`${model.linePrefix}line.time`) ?? [];
+  const level = Math.abs(model.head.robot?.line ?? NaN);
   let least = null;
   for (const t of times) {
     const gap = clearance(model, t)?.least;
