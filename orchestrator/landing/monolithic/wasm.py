@@ -203,13 +203,13 @@ def _without_machine_code() -> None:
     """Keep Numba from making code for this machine, which nobody runs, and from keeping it: nine tenths of the time."""
     from numba.core import caching, codegen
 
-    codegen.JITCodeLibrary._finalize_specific = lambda self: None
-    codegen.JITCodeLibrary.get_pointer_to_function = lambda self, name: self._ensure_finalized() or 0
-    codegen.JITCPUCodegen.set_env = lambda self, name, env: None
-    codegen.CPUCodeLibrary._optimize_final_module = lambda self: None
-    codegen.CPUCodeLibrary._optimize_functions = lambda self, module: None
-    caching.Cache.load_overload = lambda self, signature, context: None
-    caching.Cache.save_overload = lambda self, signature, data: None
+    library, cache = codegen.JITCodeLibrary, caching.Cache
+    spared = [(library, name) for name in ("_finalize_specific", "_optimize_final_module", "_optimize_functions")]
+    spared += [(codegen.JITCPUCodegen, "set_env"), (cache, "load_overload"), (cache, "save_overload")]
+    for owner, name in spared:
+        setattr(owner, name, lambda *_: None)
+    # what asks for a pointer to the code wants the library whole
+    setattr(library, "get_pointer_to_function", lambda self, _: self._ensure_finalized() or 0)  # noqa: B010
 
 
 def _entries() -> dict[str, Any]:
@@ -249,7 +249,8 @@ def _unpack() -> Any:
     from orchestrator.landing.monolithic import block
 
     kinds = {"real": types.float64, "complex": types.complex128, "whole": types.int64, "truth": types.boolean}
-    names: dict[str, Any] = {"carray": numba.carray, **{name: _pointer(kind) for name, kind in kinds.items()}}
+    names: dict[str, Any] = {name: _pointer(kind) for name, kind in kinds.items()}
+    names["carray"] = numba.carray  # type: ignore[attr-defined]
     names |= {type(part).__name__: type(part) for part in _tuples(block.example())}
     exec(block.unpack_source(), names)
     return names["unpack"]
