@@ -20,7 +20,12 @@ export function camera(name, { at: [x, y, z], low, high, reach, hangs, span, sag
   const close = { heights: 1, size: 1, follow: false };
   if (name === 'wheel') {
     const back = Math.max(1, 1.15 / aspect); // a narrow window sees less to the sides
-    return { ...close, follow: true, target: [x, y, z + 0.03], eye: [x + 0.5 * back, y - 0.62 * back, z + 0.2 * back] };
+    return {
+      ...close,
+      follow: true,
+      target: [x, y, z + 0.03],
+      eye: [x + 0.5 * back, y - 0.62 * back, z + 0.2 * back],
+    };
   }
   if (name === 'span' && span) return wholeSpan(span, sag, reach, aspect);
   const tangent = Math.tan((FIELD * Math.PI) / 360);

@@ -292,5 +292,5 @@ function drawLimits(plot, limits) {
 function labelHeight(y, top, height, px) {
   const room = 12 * px;
   if (y < top + room) return Math.max(y, top) + room;
-  return Math.min(y, top + height) - 4 * px;
+  return Math.min(y, top + height) - 6 * px;
 }

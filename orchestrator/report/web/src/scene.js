@@ -20,14 +20,21 @@ import { chord, hermite, locate } from './model.js';
 import { difference, exaggerated, moved, movedLine } from './reference.js';
 import { Ground, groundBelow } from './supports.js';
 
+const pixelsOf = canvas => {
+  const ratio = Math.min(devicePixelRatio || 1, 2);
+  return [canvas.clientWidth, canvas.clientHeight].map(length => Math.max(1, Math.round(length * ratio)));
+};
+
 export class View {
   options = { heights: 1, size: 1, forces: 'total', trace: true, reference: null };
   name = 'landing';
   #stale = true; // what depends on the scales alone has to be drawn anew
 
   constructor(canvas, invalidate) {
+    [canvas.width, canvas.height] = pixelsOf(canvas); // before there is a context: a buffer that changes its size is made twice
     const context = canvas.getContext('webgl2', { antialias: true, alpha: true }); // three would say so on the console
     if (!context) throw new Error('no WebGL 2');
+    this.canvas = canvas;
     this.renderer = new WebGLRenderer({ canvas, context });
     this.renderer.debug.checkShaderErrors = false; // asking for errors would wait for the compiler, shader by shader
     this.camera = new PerspectiveCamera(FIELD, 1, 0.02, 4000);
@@ -106,13 +113,15 @@ export class View {
 
   // ---- cameras ------------------------------------------------------------------------------------------------
 
-  size(width, height) {
+  // Fit the canvas to its place, in pixels of the screen.
+  size() {
+    const { canvas } = this;
+    const [width, height] = pixelsOf(canvas);
+    if (canvas.width !== width || canvas.height !== height) this.renderer.setSize(width, height, false);
     const aspect = width / height;
     const reshaped = Math.abs(aspect - this.camera.aspect) > 0.25;
-    this.renderer.setPixelRatio(Math.min(devicePixelRatio || 1, 2));
-    this.renderer.setSize(width, height, false);
     Object.assign(this.camera, { aspect }).updateProjectionMatrix();
-    this.perPixel = Math.tan((FIELD * Math.PI) / 360) / height;
+    this.perPixel = Math.tan((FIELD * Math.PI) / 360) / canvas.clientHeight;
     if (reshaped && this.model) this.view(this.name);
   }
 

@@ -47,8 +47,7 @@ export class Stage {
   }
 
   #fit() {
-    const { width, height } = this.viewport.getBoundingClientRect();
-    if (width && height) this.gl?.size(width, height);
+    if (this.viewport.clientWidth && this.viewport.clientHeight) this.gl?.size();
     this.app.invalidate();
   }
 
