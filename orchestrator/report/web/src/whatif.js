@@ -8,6 +8,7 @@ const FRAME = 0.02;   // s between shapes of the line
 const BLOCKS = 'whatif.starts';
 const INPUTS = /^robot\.(thrust|torque\.|wheel\[\d+\]\.drive_torque)/;
 const VERDICTS = { true: ['Safe to land', 'safe'], false: ['Not safe to land', 'unsafe'], null: ['Safety not judged', 'none'] };
+const NOT_CLEAR = ['Not clearly safe', 'unclear'];
 
 // Fill the place of the what-if; nothing where the page has none, a word where there is a reason.
 export function whatif(app) {
@@ -204,7 +205,7 @@ class WhatIf {
     const scene = start.scene ?? {}, own = original.head, same = start.robot === own.robot?.name && own.plots?.length;
     const panels = same ? {} : { plots: plots(start, signals), hud: hud(start) };
     const head = { ...own, ...scene, ...panels, line: { prefix: '', exact: true }, reference: null, runs: [], whatif: this.about };
-    const said = judge(limitsFor(start, wishes.mass), new Model(head, arrays)), [word, name] = VERDICTS[said.safe];
+    const said = judge(limitsFor(start, wishes.mass), new Model(head, arrays)), [word, name] = said.safety.startsWith('NOT CLEARLY') ? NOT_CLEAR : VERDICTS[said.safe];
     const verdict = { word: before ? before + word.toLowerCase() : word, class: name };
     return new Model({ ...head, verdict, safety: this.#covers(said), limits: said.limits, not_judged: said.not_judged }, arrays);
   }
