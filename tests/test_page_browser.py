@@ -244,6 +244,7 @@ def test_a_click_on_the_map_opens_the_landing(browser: Any, tmp_path: Path):
     summary = json.loads((folder / "runs" / "run4" / "summary.json").read_text())
     assert found.js("__page.app.model.head.limits.roll.share") == pytest.approx(summary["limits"]["roll"]["share"])
     assert found.js("__page.state().robot[1]") == pytest.approx(60.0, abs=1e-5)
+    assert found.page.locator(".tile b").first.inner_text() == "3", "how many are safe stays as it is"
     found.page.locator("#map .cell").nth(2).click()
     found.until("document.querySelector('.map-said').textContent.includes('not kept')", "it says why nothing is shown")
     assert found.complaints == []

@@ -124,11 +124,14 @@ def test_the_outline_of_a_map_parts_safe_from_unsafe_and_leaves_holes_open(call)
 
 
 def test_limits_are_in_the_axis_unless_they_would_flatten_the_curve(call):
-    near, far = call(
-        ("curves.js", "range", -5.0, 5.0, [{"at": 14.5}, {"at": -14.5}]),
+    both = [{"at": 14.5}, {"at": -14.5}]
+    near, far, flat = call(
+        ("curves.js", "range", -5.0, 5.0, both),
         ("curves.js", "range", 14.0, 16.0, [{"at": 39.3}]),
+        ("curves.js", "range", -2.0, 3.0, both),
     )
-    assert near[0] < -14.5 and near[1] > 14.5 and far[1] < 17.0
+    assert near[0] < -14.5 and near[1] > 14.5
+    assert far[1] < 17.0 and max(map(abs, flat)) < 4.0, "to both sides or to none"
 
 
 def test_a_difference_is_exaggerated_by_a_power_of_ten_that_keeps_it_in_the_picture(call):

@@ -79,11 +79,13 @@ export function extent(lists) {
 
 const LEAST_PART = 0.2; // of the axis that the values take where a limit is shown beside them
 
-// Range of the axis: all values, and each limit that does not flatten them.
+// Range of the axis: all values, and each limit (to both sides, where it holds to both) that does not flatten them.
 export function range(low, high, limits = []) {
   const own = high - low;
-  for (const { at } of [...limits].sort((a, b) => Math.abs(a.at) - Math.abs(b.at))) {
-    const [l, h] = [Math.min(low, at), Math.max(high, at)];
+  const sizes = [...new Set(limits.map(({ at }) => Math.abs(at)))].sort((a, b) => a - b);
+  for (const size of sizes) {
+    const both = limits.map(({ at }) => at).filter(at => Math.abs(at) === size);
+    const [l, h] = [Math.min(low, ...both), Math.max(high, ...both)];
     if (own >= LEAST_PART * (h - l)) [low, high] = [l, h];
   }
   const pad = 0.07 * (high - low) || 0.07 * Math.abs(high) || 1;

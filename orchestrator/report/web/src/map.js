@@ -84,7 +84,7 @@ export class SweepMap {
     const { x, y } = this.map;
     const kept = this.chosen ?? 0;
     const rows = y?.values.length ?? 1;
-    const height = TOP + BOTTOM + Math.min(420, Math.max(70, rows * 44));
+    const height = TOP + BOTTOM + Math.min(420, Math.max(rows > 1 ? 160 : 70, rows * 44));
     const width = Math.min(WIDEST, Math.max(NARROWEST, this.host.clientWidth || WIDEST));
     this.width = this.host.clientWidth;
     const box = { x0: LEFT, x1: width - RIGHT, y0: TOP, y1: height - BOTTOM };

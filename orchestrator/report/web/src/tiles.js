@@ -18,7 +18,7 @@ export class Tiles {
     this.verdict = document.querySelector('.verdict');
     this.covers = document.getElementById('covers');
     this.note = document.querySelector('.what-if-note');
-    this.kept = [...document.querySelectorAll('.tile')].map(tile => ({
+    this.kept = [...document.querySelectorAll('.tile[data-limit], .tile[data-tile]')].map(tile => ({
       tile,
       html: tile.innerHTML,
       style: tile.className,
