@@ -244,6 +244,9 @@ def test_a_comparison_holds_the_reference_and_the_other_runs(tmp_path: Path, web
     for signal in {s["name"] for plot in head["plots"] for s in plot["signals"]}:
         assert {signal, f"reference/{signal}", f"iqn_ils_0.01s/{signal}"} <= set(arrays)
     assert np.array_equal(arrays["reference/time"], TIME) and "reference/line.position" in arrays
+    height = "robot.body.position.z"
+    exact = comparison.results[0].table[height] - comparison.reference.table[height]
+    assert arrays[f"difference/{height}"] == pytest.approx(exact, rel=1e-7), "taken before it is rounded to 32 bits"
     assert "reference/robot.wheel[1].position.z" in arrays and "iqn_ils_0.01s/robot.wheel[1].position.z" not in arrays
 
 

@@ -7,6 +7,8 @@ from dataclasses import dataclass, replace
 from pathlib import Path
 from typing import Any
 
+from orchestrator.coupling.run.compare import matching_rows
+from orchestrator.coupling.run.results import Table
 from orchestrator.report.drawing import legend
 from orchestrator.report.page import tables
 from orchestrator.report.page.curves import hud_of, plots_of
@@ -22,7 +24,7 @@ from orchestrator.report.page.whatif import WhatIf, whatif_of
 from orchestrator.runs.compare import Comparison
 from orchestrator.runs.result import Run, verdict_word
 
-REFERENCE = "reference/"
+REFERENCE, DIFFERENCE = "reference/", "difference/"
 THROUGH_POINTS = "The line is a smooth curve through {n} points: the nodes of its mesh were not recorded."
 Manifest = Mapping[str, Any]
 
@@ -70,6 +72,7 @@ def _of_comparison(found: Comparison, manifest: Manifest, whatif: WhatIf, most: 
     reference, plots = found.reference, _plots(first)
     names = _names(plots)
     sources = [_source(first, plots), Source(REFERENCE, reference.table, reference.fields, names)]
+    sources.append(_difference(first.table, reference.table, names))
     sources += [_source(run, plots, f"{run.label}/") for run in others]
     data = pack_within(sources, most, whatif.arrays)
     head = _head("comparison" if _kind(first) == "run" else "graph", first, manifest, data, plots)
@@ -80,6 +83,13 @@ def _of_comparison(found: Comparison, manifest: Manifest, whatif: WhatIf, most: 
     lower += [*_lower(first, manifest), tables.limits(reference.safety, "reference"), *_of_each(others)]
     lower.append(tables.parameters(manifest, first.summary))
     return Content(head, data, Body(_comparison_top(found, first, manifest, data), _more(lower)))
+
+
+def _difference(run: Table, reference: Table, names: Sequence[str]) -> Source:
+    """Return run minus reference, taken before both are rounded: that would leave steps where they agree well."""
+    rows = matching_rows(reference["time"], run["time"])
+    both = {name: run[name] - reference[name][rows] for name in names if name in run and name in reference}
+    return Source(DIFFERENCE, {"time": run["time"]} | both, {}, names, full=False)
 
 
 # -- head ---------------------------------------------------------------------------------------------------------

@@ -80,9 +80,15 @@ export class App {
     }
   }
 
+  // A part that fails in a frame is left alone until another model is shown: one error, not sixty a second.
   #tell(method, ...values) {
-    for (const { name, part } of this.#parts) {
-      if (part[method]) this.guard(name, () => part[method](...values));
+    for (const entry of this.#parts) {
+      const { name, part } = entry;
+      if (method === 'show') entry.failed = false;
+      if (!part[method] || entry.failed) continue;
+      const before = this.page.errors.length;
+      this.guard(name, () => part[method](...values));
+      entry.failed = this.page.errors.length > before;
     }
   }
 

@@ -18,8 +18,10 @@ export const spanSize = (length, reach) =>
 // `low` and `high` the heights between which the robot moves, its own size included.
 export function camera(name, { at: [x, y, z], low, high, reach, hangs, span, sag, aspect }) {
   const close = { heights: 1, size: 1, follow: false };
-  if (name === 'wheel')
-    return { ...close, follow: true, target: [x, y, z + 0.03], eye: [x + 0.5, y - 0.62, z + 0.2] };
+  if (name === 'wheel') {
+    const back = Math.max(1, 1.15 / aspect); // a narrow window sees less to the sides
+    return { ...close, follow: true, target: [x, y, z + 0.03], eye: [x + 0.5 * back, y - 0.62 * back, z + 0.2 * back] };
+  }
   if (name === 'span' && span) return wholeSpan(span, sag, reach, aspect);
   const tangent = Math.tan((FIELD * Math.PI) / 360);
   const middle = (low + high) / 2;

@@ -108,11 +108,6 @@ export class Model {
     return this.time[this.time.length - 1] ?? 0;
   }
 
-  // The same page with other signals (a what-if) or another head; arrays not given stay.
-  with(arrays, head = {}) {
-    return new Model({ ...this.head, ...head }, { ...this.arrays, ...arrays }, this.prefix);
-  }
-
   // Another landing that this page carries; its arrays have a prefix of their own.
   other(prefix, head = {}) {
     return new Model({ ...this.head, ...head }, this.arrays, prefix);

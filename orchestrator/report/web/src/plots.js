@@ -93,6 +93,7 @@ export class Plots {
       ...panel,
       curves: found,
       unit,
+      digits: isDifference ? 3 : panel.digits,
       limits: isDifference ? [] : (panel.limits ?? []),
       title: isDifference ? `Δ ${panel.title}` : panel.title,
     };
