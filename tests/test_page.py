@@ -337,6 +337,14 @@ def test_starts_are_embedded_with_the_solver_that_they_fit(tmp_path: Path, web: 
     assert about["starts"][1]["scene"]["robot"]["name"] == "made_up" and "geometry" not in about["starts"][0]
 
 
+def test_a_comparison_has_the_starts_of_its_folder(tmp_path: Path, web: Path):
+    folder = tmp_path / "all"
+    write_comparison(RunDirectory(folder), compared_to(on_a_line(), ["jacobi", "iqn_ils"]))
+    left_starts(folder, "abc")
+    page = Page(text_of(folder, with_solver(web, "abc")))
+    assert page.head["kind"] == "comparison" and len(page.head["whatif"]["starts"]) == 2
+
+
 @pytest.mark.parametrize("built", ["other", "", None])
 def test_without_the_right_solver_there_are_no_sliders_and_it_says_why(tmp_path: Path, web: Path, built: str | None):
     folder = tmp_path / "run"

@@ -247,7 +247,9 @@ def test_shipped_scenarios_say_what_they_always_said(path: Path):
 
 
 def judged_by(name: str) -> dict[str, float | bool]:
-    """Return the limits of a shipped scenario, which it has beside what it always said."""
+    """Return the limits of a scenario of the paper, which it has beside what it always said."""
+    if name.startswith(("line_", "crossing_")):
+        return {}
     if name.startswith("rig"):
         return {"limits.z": False, "limits.rated_strength": 78110.0}
     line = {"limits.conductor_spacing": 3.45, "limits.safe_clearance": 1.0, "limits.rated_strength": 98370.0}

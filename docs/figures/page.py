@@ -31,7 +31,7 @@ def main() -> None:
     with sync_playwright() as playwright:
         browser = playwright.chromium.launch(executable_path=shutil.which("chromium"), args=ARGUMENTS)
         for name, colours, view, at in PICTURES:
-            place = browser.new_context(viewport={"width": 1440, "height": 930}, color_scheme=colours)
+            place = browser.new_context(viewport={"width": 1440, "height": 985}, color_scheme=colours)
             place.set_default_timeout(1e3 * PATIENCE)
             _take(place.new_page(), page, view, at, OUT / name)
         browser.close()

@@ -48,7 +48,8 @@ def of_results(results: Comparison | list[Run], manifest: Manifest, web: Path, m
     most : characters that its arrays may take
     """
     first, *others = results.results if isinstance(results, Comparison) else results
-    whatif = whatif_of(first.directory, web) if first.directory is not None else WhatIf()
+    folder = results.directory if isinstance(results, Comparison) else first.directory
+    whatif = whatif_of(folder, web) if folder is not None else WhatIf()
     if isinstance(results, Comparison):
         found = _of_comparison(results, manifest, whatif, most)
     else:

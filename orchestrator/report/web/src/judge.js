@@ -43,8 +43,10 @@ function words(safe, found, faults, touched, airborne, end) {
   const until = `until ${end} s`;
   if (safe) return `SAFE ${until}: ${Object.keys(found).join(', ')} kept${airborne ? '; in the air at the end' : ''}`;
   if (safe === null) return `NOT JUDGED ${until}: ${touched ? 'no limit is known' : 'no wheel has touched the line'}`;
-  const exceeded = named(found, 'exceeded'), why = exceeded.length ? [`${exceeded.join(', ')} exceeded`] : [];
-  return `NOT SAFE ${until}: ${[...why, ...faults].join('; ')}`;
+  const exceeded = named(found, 'exceeded'), unclear = named(found, 'unclear');
+  const why = exceeded.length ? [`${exceeded.join(', ')} exceeded`] : [];
+  if (unclear.length) why.push(`margin of ${unclear.join(', ')} smaller than the estimated error`);
+  return `NOT ${exceeded.length || faults.length ? '' : 'CLEARLY '}SAFE ${until}: ${[...why, ...faults].join('; ')}`;
 }
 
 // The worst of all wheels; what is not finite is beyond any limit.
@@ -116,8 +118,8 @@ function wheelForce(model, k) {
 }
 
 const OF_WHEELS = {
-  roll: (model, k) => { const [, y, z] = tangent(model, k); return signal(model, 'robot.roll').map((a, i) => a - Math.atan2(z[i], y[i])); },
-  yaw: (model, k) => { const [x, y] = tangent(model, k); return signal(model, 'robot.yaw').map((a, i) => a - Math.atan2(-x[i], y[i])); },
+  roll: (model, k) => { const roll = signal(model, 'robot.roll'), [, y, z] = tangent(model, k); return roll.map((a, i) => a - Math.atan2(z[i], y[i])); },
+  yaw: (model, k) => { const yaw = signal(model, 'robot.yaw'), [x, y] = tangent(model, k); return yaw.map((a, i) => a - Math.atan2(-x[i], y[i])); },
   slip, airborne: (model, k) => timeOff(model.time, openWheels(model)[k]), wheel_force: wheelForce,
 };
 

@@ -8,6 +8,7 @@ const FRAME = 0.02;   // s between shapes of the line
 const BLOCKS = 'whatif.starts';
 const INPUTS = /^robot\.(thrust|torque\.|wheel\[\d+\]\.drive_torque)/;
 const VERDICTS = { true: ['Safe to land', 'safe'], false: ['Not safe to land', 'unsafe'], null: ['Safety not judged', 'none'] };
+const NOT_CLEAR = ['Not clearly safe', 'unclear'];
 
 // Fill the place of the what-if; nothing where the page has none, a word where there is a reason.
 export function whatif(app) {
@@ -156,7 +157,7 @@ class WhatIf {
       this.#say(`No such landing: ${answer.failed}.`, true);
       return null;
     }
-    const found = this.model(start, wishes, answer);
+    const found = this.model(start, wishes, answer, '');
     found.head.opened = `${cell.words}: solved in this browser`;
     this.#begin([start], found);
     return found;
@@ -195,7 +196,7 @@ class WhatIf {
   // -- what is shown ------------------------------------------------------------------------------------------------
 
   // The answer as the page shows landings; verdict and limits are its own.
-  model(start, wishes, { time, signals, tension, line }) {
+  model(start, wishes, { time, signals, tension, line }, before = 'What if: ') {
     const { original } = this.app, arrays = { time, ...signals, [TENSION_ALONG]: tension };
     for (const [name, values] of Object.entries(line)) arrays[`line.${name}`] = values;
     for (const name of Object.keys(original.arrays)) {   // inputs over time are as they were
@@ -204,25 +205,27 @@ class WhatIf {
     const scene = start.scene ?? {}, own = original.head, same = start.robot === own.robot?.name && own.plots?.length;
     const panels = same ? {} : { plots: plots(start, signals), hud: hud(start) };
     const head = { ...own, ...scene, ...panels, line: { prefix: '', exact: true }, reference: null, runs: [], whatif: this.about };
-    const said = judge(limitsFor(start, wishes.mass), new Model(head, arrays)), [word, name] = VERDICTS[said.safe];
-    const verdict = { word: `What if: ${word.toLowerCase()}`, class: name };
+    const said = judge(limitsFor(start, wishes.mass), new Model(head, arrays)), [word, name] = said.safety.startsWith('NOT CLEARLY') ? NOT_CLEAR : VERDICTS[said.safe];
+    const verdict = { word: before ? before + word.toLowerCase() : word, class: name };
     return new Model({ ...head, verdict, safety: this.#covers(said), limits: said.limits, not_judged: said.not_judged }, arrays);
   }
 
+  get #solver() { return `${this.about.solver} solver, local tolerance ${this.about.tolerance.toExponential().replace('e-', 'e−')} m`; }
+
   #covers({ safety, not_judged: missing }) {
     const left = Object.keys(missing);
-    return `${safety}${left.length ? `; not judged: ${left.join(', ')}` : ''}. A what-if: its error is not estimated.`;
+    return `${safety}${left.length ? `; not judged: ${left.join(', ')}` : ''}. A what-if by the ${this.#solver}: its error is not estimated.`;
   }
 
   // What was solved, by what, and how the command line gives the same.
   #words(start, wishes) {
-    const { solver, tolerance, scenario } = this.about, first = this.starts[0];
+    const first = this.starts[0];
     const settings = start.sliders.filter(({ name, value }) => wishes[name] !== value).map(({ name, key }) => `--set ${key}=${+wishes[name].toPrecision(12)}`);
     if (wishes.mass !== start.sliders[0].value) settings.push(...Object.entries(start.held).map(([key, value]) => `--set ${key}=${+value.toPrecision(15)}`));
     if (start.position !== first.position) settings.unshift(`--set landing.position=${start.position}`);
     if (start.robot !== first.robot) settings.unshift(`--robot ${start.robot}`);
-    return `A what-if, not the run: the ${solver} solver, local tolerance ${tolerance.toExponential().replace('e-', 'e−')} m, in this page in ${fixed(this.ms / 1000, 2)} s; ` +
-      `no estimate of its error. As ${scenario} with ${settings.join(' ')}.`;
+    return `A what-if, not the run: by the ${this.#solver}, in this page in ${fixed(this.ms / 1000, 2)} s; no estimate of its error. ` +
+      `As ${this.about.scenario} with ${settings.join(' ')}.`;
   }
 }
 
