@@ -225,7 +225,7 @@ class WhatIf {
     if (start.position !== first.position) settings.unshift(`--set landing.position=${start.position}`);
     if (start.robot !== first.robot) settings.unshift(`--robot ${start.robot}`);
     return `A what-if, not the run: by the ${this.#solver}, in this page in ${fixed(this.ms / 1000, 2)} s; no estimate of its error. ` +
-      `As ${this.about.scenario} with ${settings.join(' ')}.`;
+      `As ${this.about.cells ? 'the landing of the map' : this.about.scenario} with ${settings.join(' ')}.`;
   }
 }
 
