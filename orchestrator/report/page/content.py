@@ -86,7 +86,7 @@ def _of_comparison(found: Comparison, manifest: Manifest, whatif: WhatIf, most: 
     return Content(head, data, Body(_comparison_top(found, first, manifest, data), _more(lower)))
 
 
-def _difference(run: Table, reference: Table, names: Sequence[str]) -> Source:
+def _difference(run: Table, reference: Table, names: tuple[str, ...]) -> Source:
     """Return run minus reference, taken before both are rounded: that would leave steps where they agree well."""
     rows = matching_rows(reference["time"], run["time"])
     both = {name: run[name] - reference[name][rows] for name in names if name in run and name in reference}

@@ -6,6 +6,7 @@ import {
   Line,
   LineBasicMaterial,
   LineDashedMaterial,
+  MeshBasicMaterial,
   MeshPhongMaterial,
 } from 'three';
 import { Cable, strandMaterial } from './cable.js';
@@ -32,6 +33,7 @@ export class Content {
     this.palette = { ...materials(), ...supportPalette(), strands: strandMaterial() };
     this.dashed = new LineDashedMaterial();
     this.path = new LineBasicMaterial();
+    this.nothing = new MeshBasicMaterial({ visible: false });
     // where both are in the same place the run is seen, not a mixture
     const behind = { polygonOffset: true, polygonOffsetFactor: 2, polygonOffsetUnits: 8 };
     this.pale = new MeshPhongMaterial({ transparent: true, opacity: 0.4, depthWrite: false, ...behind });
@@ -79,7 +81,8 @@ export class Content {
   // The reference: a pale robot and line.
   #reference(model) {
     const nodes = model.hasReference ? model.line(model.start, `reference/${model.linePrefix}`) : null;
-    const pale = new Proxy({}, { get: () => this.pale }); // whatever a part is made of
+    // whatever a part is made of, but for the discs: they would tint those of the run
+    const pale = new Proxy({}, { get: (_, name) => (name === 'glass' ? this.nothing : this.pale) });
     const robot = model.hasReference ? model.head.robot : null;
     this.#made('ghostRobot', robot, () => buildRobot(robot, pale));
     const shape = nodes && [nodes.s.length, this.radius, this.landing];
@@ -91,6 +94,7 @@ export class Content {
     this.path.color.set(css('--trace'));
     this.pale.color.set(css('--ghost'));
     this.palette.tower.color.set(css('--tower'));
+    this.palette.frame.color.set(css('--frame'));
   }
 
   // Where the robot is seen: the heights between which it moves, its own size included, and its reach.

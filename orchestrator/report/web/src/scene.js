@@ -31,8 +31,10 @@ export class View {
   #stale = true; // what depends on the scales alone has to be drawn anew
 
   constructor(canvas, invalidate) {
-    [canvas.width, canvas.height] = pixelsOf(canvas); // before there is a context: a buffer that changes its size is made twice
-    const context = canvas.getContext('webgl2', { antialias: true, alpha: true }); // three would say so on the console
+    // before there is a context: a buffer that changes its size is made twice
+    [canvas.width, canvas.height] = pixelsOf(canvas);
+    // asked here and not by three, which would complain on the console where there is none
+    const context = canvas.getContext('webgl2', { antialias: true, alpha: true });
     if (!context) throw new Error('no WebGL 2');
     this.canvas = canvas;
     this.renderer = new WebGLRenderer({ canvas, context });
