@@ -101,7 +101,7 @@ def test_runs_that_fail_are_said_and_what_is_not_complete_has_no_indices():
 
 
 def test_what_is_written_and_drawn(tmp_path: Path):
-    read = study(64)
+    read = study(16)
     every = [*design.rows(read, 0, 10), *design.sensitivity_rows(read)]
     found = Swept(read, 1, [outcome(read, row) for row in every], complete=True)
     write.save(tmp_path, found)

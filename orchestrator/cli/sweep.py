@@ -24,6 +24,9 @@ def sweep(
     ] = None,
     workers: Annotated[int | None, typer.Option(min=1, help="Processes. Default: one a processor.")] = None,
     timeout: Annotated[float | None, typer.Option(help="Seconds that a run may take. Default: the study's.")] = None,
+    dask: Annotated[
+        str | None, typer.Option(metavar="ADDRESS", help="Dask scheduler whose workers make the runs. Default: here.")
+    ] = None,
     quiet: options.Quiet = False,
 ) -> None:
     """Run a scenario with many values: which landings are safe, by which margin, and how probably.
@@ -39,7 +42,9 @@ def sweep(
     read = load_study(path_of(study))
     folder = write.place_of(out, read)
     with _bar(quiet) as told:
-        found = run_all(read, folder / write.STORE, lambda swept: write.save(folder, swept), workers, timeout, told)
+        found = run_all(
+            read, folder / write.STORE, lambda swept: write.save(folder, swept), workers, timeout, told, dask
+        )
     _print(found)
     print(f"table in {folder / write.TABLE}")
     drawn = maps.write(folder, read, found.outcomes), odds.write(folder, read, found.chances)

@@ -8,22 +8,29 @@ from __future__ import annotations
 
 import errno
 import os
+import shutil
+import tempfile
+import threading
 from collections.abc import Callable, Iterable, Iterator, Mapping, Sequence
 from concurrent.futures import Future, as_completed
 from concurrent.futures import TimeoutError as RanTooLong
 from concurrent.futures.process import BrokenProcessPool
 from contextlib import ExitStack
+from multiprocessing import current_process
 from pathlib import Path
-from typing import Any, Self
+from typing import TYPE_CHECKING, Any, Self
 
 from pebble import ProcessExpired, ProcessPool
 
 from fmus.face.first_use import compile_modules
 from fmus.kernels.jit import is_compiled
 from orchestrator.coupling.errors import InputError
-from orchestrator.runs import worker
-from orchestrator.runs.job import Done, Job, found, make, remove_half_done
+from orchestrator.runs import cluster, worker
+from orchestrator.runs.job import Done, Job, code_version, found, make, remove_half_done
 from orchestrator.scenario.types import LandingScenario
+
+if TYPE_CHECKING:
+    from distributed import Client
 
 Counted = Callable[[int, int], None]
 """Told how many runs are done, and of how many."""
@@ -64,19 +71,22 @@ def run_batch(
 class Batches:
     """Batches one after another with the same workers, which are started with the first run that has to be made.
 
-    Parameters as for `run_batch`.
+    Parameters as for `run_batch`; `dask`: address of a scheduler, whose workers make the runs in the place of this machine.
     """
 
-    def __init__(self, store: Path, workers: int | None = None, timeout: float | None = None):
-        self.store, self.workers, self.timeout = store, workers or _processors(), timeout
+    def __init__(self, store: Path, workers: int | None = None, timeout: float | None = None, dask: str | None = None):
+        self.store, self.workers, self.timeout, self.dask = store, workers or _processors(), timeout, dask
         self._open = ExitStack()
         self._pool: ProcessPool | None = None
+        self._client: Client | None = None
 
     def __enter__(self) -> Self:
+        if self.dask is not None:
+            self._client = self._open.enter_context(cluster.connected(self.dask))
         return self
 
     def __exit__(self, *error: Any) -> None:
-        self._pool = None
+        self._pool = self._client = None
         self._open.__exit__(*error)
 
     def run(
@@ -101,13 +111,19 @@ class Batches:
 
     def _made(self, left: dict[str, Job]) -> Iterator[tuple[str, Done]]:
         """Yield each run of `left` as it is finished; those that have left nothing before come last."""
-        if any(isinstance(job.loaded(), LandingScenario) for job in left.values()):
-            compile_modules()
-        alone, lost = _first_of_its_kind(left), {key for key in left if _lost(self.store, key).is_file()}
+        alone, lost = self._compiling(left), {key for key in left if _lost(self.store, key).is_file()}
         others = sorted((key for key in left if key not in alone), key=lambda key: key in lost)
         solvers = {job.solver for job in left.values()}
         yield from self._tried({key: left[key] for key in alone}, solvers, None)
         yield from self._tried({key: left[key] for key in others}, solvers, self.timeout)
+
+    def _compiling(self, left: Mapping[str, Job]) -> list[str]:
+        """Return the runs that go first and alone: they compile what the others load, if that is not done yet."""
+        if self.dask is not None:  # each machine does so for itself
+            return []
+        if any(isinstance(job.loaded(), LandingScenario) for job in left.values()):
+            compile_modules()
+        return _first_of_its_kind(left)
 
     def _tried(self, left: dict[str, Job], solvers: Iterable[str], limit: float | None) -> Iterator[tuple[str, Done]]:
         """Yield each run of `left`; should all workers be lost at once, the rest is given to new ones."""
@@ -126,6 +142,9 @@ class Batches:
     ) -> Iterator[tuple[str, Future[None]]]:
         """Yield what has ended, however that was."""
         if not left:
+            return
+        if self._client is not None:
+            yield from cluster.ended(self._client, make_elsewhere, left, self.store, limit)
             return
         pool = self._started(solvers)
         futures: dict[Future[None], str] = {
@@ -161,9 +180,9 @@ def _processors() -> int:
     return len(count(0)) if count else os.cpu_count() or 1
 
 
-def _first_of_its_kind(left: dict[str, Job]) -> list[str]:
+def _first_of_its_kind(left: Mapping[str, Job]) -> list[str]:
     """Return the runs that go first, alone and without a time limit: they compile the kernels that the others load."""
-    kinds = {job.solver: key for key, job in reversed(left.items())}
+    kinds = {job.solver: key for key, job in reversed([*left.items()])}
     return [key for solver, key in kinds.items() if not is_compiled(COMPILED[solver])]
 
 
@@ -193,6 +212,8 @@ def _failure(error: BaseException | None) -> str | None:
             return "took longer than it may, and was ended; give it more time (timeout)"
         case ProcessExpired():
             return f"its process died (exit code {error.exitcode}); run the scenario alone to see why"
+        case cluster.LostError():
+            return str(error)
         case OSError() if error.errno in NO_ROOM:
             raise error
         case _:  # whatever it is, it is that run's alone
@@ -202,3 +223,43 @@ def _failure(error: BaseException | None) -> str | None:
 def _lost(store: Path, key: str) -> Path:
     """Return the file that says why a run has left nothing."""
     return store / f"{key}.failed"
+
+
+# -- in a Dask worker -------------------------------------------------------------------------------------------
+
+
+_here = threading.local()
+"""Of a thread of a Dask worker: its child, which is kept from run to run."""
+
+
+def make_elsewhere(job: Job, key: str, version: str, limit: float | None) -> tuple[cluster.Packed | None, str]:
+    """Make a run in a child of this process; return its folder, or why it has left nothing."""
+    if version != code_version():
+        return (
+            None,
+            "the cluster's worker has another version of this program, or of its libraries; install the same there",
+        )
+    try:
+        if job.key != key:
+            return None, f"{job.scenario}: the cluster's worker has other files under the same paths; share a folder"
+    except InputError as error:
+        return None, f"on the cluster's worker: {error}"
+    batches = _batches()
+    batches.timeout = limit
+    (done,) = batches.run([job])
+    if done.directory is None:
+        return None, str(done.failure)
+    packed = {file.name: file.read_bytes() for file in done.directory.iterdir()}
+    shutil.rmtree(done.directory)
+    return packed, ""
+
+
+def _batches() -> Batches:
+    """Return what makes runs in a child of this thread."""
+    if not hasattr(_here, "batches"):
+        current_process().daemon = (
+            False  # Dask's workers are daemons, which may have no children; this one ends with it
+        )
+        _here.folder = tempfile.TemporaryDirectory(prefix="line-landing-")
+        _here.batches = Batches(Path(_here.folder.name), 1)
+    return _here.batches

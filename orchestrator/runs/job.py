@@ -169,7 +169,7 @@ def make(job: Job, store: Path) -> None:
         table, summary = SOLVERS[job.solver](job, scenario)
     except (InputError, ModuleError, RunError) as error:
         failure = str(error)
-    with _put(store, job.key) as directory:
+    with put(store, job.key) as directory:
         if table:
             directory.write_table("results.csv", table)
         directory.write_json("summary.json", summary)
@@ -177,7 +177,7 @@ def make(job: Job, store: Path) -> None:
 
 
 @contextmanager
-def _put(store: Path, key: str) -> Iterator[RunDirectory]:
+def put(store: Path, key: str) -> Iterator[RunDirectory]:
     """Give a folder that is moved into place when it is whole, and removed when it does not come to that."""
     temporary = store / f".{key}.{os.getpid()}"
     shutil.rmtree(temporary, ignore_errors=True)

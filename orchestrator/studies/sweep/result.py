@@ -97,11 +97,14 @@ def run(
     workers: int | None = None,
     timeout: float | None = None,
     progress: Told = lambda done, of, failed: None,
+    dask: str | None = None,
 ) -> Sweep:
     """Return a sweep, run or found; parameters as for `orchestrator.sweep`."""
     read = _study(study)
     folder = write.place_of(Path(out) if out is not None else None, read)
-    swept = run_all(read, folder / write.STORE, lambda found: write.save(folder, found), workers, timeout, progress)
+    swept = run_all(
+        read, folder / write.STORE, lambda found: write.save(folder, found), workers, timeout, progress, dask
+    )
     return Sweep(folder, swept)
 
 

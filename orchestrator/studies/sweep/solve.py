@@ -84,19 +84,20 @@ def sweep(
     workers: int | None = None,
     timeout: float | None = None,
     told: Told = lambda done, of, failed: None,
+    dask: str | None = None,
 ) -> Swept:
     """Make the runs that `store` has not, and return all.
 
     Parameters
     ----------
     save : writes what is known so far; called every `SAVED_EVERY` seconds, and at the end, be it an interruption
-    workers, timeout : as for `run_batch`; timeout None: the study's
+    workers, timeout, dask : as for `Batches`; timeout None: the study's
     told : how far it is
     """
     ends = _looks(study)
     found = Swept(study, len(ends))
     first = 0
-    with read_once(), Batches(store, workers, timeout or study.timeout) as batches:
+    with read_once(), Batches(store, workers, timeout or study.timeout, dask) as batches:
         for end in ends:
             _Look(found, rows(study, first, end), save, told).made(batches)
             first, found.stopped = end, end < ends[-1]

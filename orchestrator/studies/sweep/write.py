@@ -4,6 +4,7 @@ from __future__ import annotations
 
 import csv
 from collections.abc import Iterator, Mapping, Sequence
+from importlib.util import find_spec
 from pathlib import Path
 from typing import Any
 
@@ -18,7 +19,7 @@ from orchestrator.studies.sweep.sensitivity import Index
 from orchestrator.studies.sweep.solve import Swept, describe
 from orchestrator.studies.sweep.study import Study
 
-STORE, TABLE, MAP, RESULT = atlas.STORE, "table.csv", "map.json", "study.json"
+STORE, TABLE, PARQUET, MAP, RESULT = atlas.STORE, "table.csv", "table.parquet", "map.json", "study.json"
 ALWAYS = ("safe", "least_margin")
 """Columns that are there even where nothing is judged."""
 Columns = dict[str, np.ndarray]
@@ -53,6 +54,7 @@ def save(folder: Path, found: Swept) -> None:
     """Write table and maps, then ``study.json``: what is complete has all."""
     rows = [cells(found.study, outcome) for outcome in found.outcomes]
     write_rows(folder / TABLE, rows)
+    write_parquet(folder / PARQUET, folder / TABLE)
     write_json(folder / MAP, atlas.content(found))
     write_json(folder / RESULT, {**describe(found), **circumstances()})
 
@@ -94,6 +96,23 @@ def _column(texts: list[str]) -> np.ndarray:
     except ValueError:
         return np.array(texts, dtype=object)
     return np.array(texts, dtype=object) if not any(texts) else numbers
+
+
+def write_parquet(path: Path, table: Path) -> None:
+    """Write the columns of `table` as Parquet, where pyarrow is there: numbers as such, null where nothing is known."""
+    if find_spec("pyarrow") is None:
+        return
+    import pyarrow
+    from pyarrow import parquet
+
+    columns = {
+        name: pyarrow.array(values, from_pandas=True)
+        if values.dtype == float
+        else pyarrow.array(values.tolist(), "string")
+        for name, values in read_columns(table).items()
+    }
+    with replacing(path) as temporary:
+        parquet.write_table(pyarrow.table(columns), temporary)
 
 
 # -- words ------------------------------------------------------------------------------------------------------
