@@ -104,6 +104,8 @@ def test_another_robot_and_another_master(file: Path):
         ("robot.parametres.mass=12", "robot.parametres: unknown key; did you mean parameters?"),
         ("simulation.stoptime=1.0", "simulation.stoptime: unknown key; did you mean stop_time?"),
         ("cabel.fmu=a.fmu", "cabel: unknown key; did you mean cable?"),
+        ("robot.limits.roll=0.1", "robot.limits: unknown key; limits stand in [limits], or in the robot's own file"),
+        ("cable.sag=5.0", "cable.sag: unknown key; how the line is strung stands in [cable.state] as sag"),
         (
             "cable.model=x",
             "cable.model: unknown key; known here: fmu, conductor, stiffness_set, steps, state, parameters",

@@ -18,7 +18,7 @@ from orchestrator.scenario import layers
 from orchestrator.scenario.check import check, known_variables, to_si
 from orchestrator.scenario.conductor import fill_set, fill_strength, share_diameter
 from orchestrator.scenario.inertia import scale_inertia
-from orchestrator.scenario.line_state import fill_expansion, state_problems
+from orchestrator.scenario.line_state import STRUNG, fill_expansion, state_problems
 from orchestrator.scenario.named_sets import fill_in
 from orchestrator.scenario.over_time import parse
 from orchestrator.scenario.types import GraphScenario, LandingScenario, Provenance, Scenario
@@ -26,6 +26,10 @@ from orchestrator.scenario.types import GraphScenario, LandingScenario, Provenan
 LANDING_KEYS = ("cable", "robot", "contact", "landing")
 GRAPH_KEYS = ("components", "connections")
 COMMAND_LINE = "command line"
+ELSEWHERE = {"robot.limits": "limits stand in [limits], or in the robot's own file"} | {
+    f"cable.{key}": f"how the line is strung stands in [cable.state] as {key}" for key in STRUNG
+}
+"""Unknown key that has its place elsewhere → where."""
 
 
 def load(
@@ -115,7 +119,8 @@ def _with_what_is_missing(found: Iterable[Complaint]) -> Iterator[Complaint]:
     for one in found:
         whole = one.message == "missing" and one.path in LANDING_KEYS
         needed = "; a landing needs cable, robot and landing, a general graph components" if whole else ""
-        yield Complaint(one.path, one.message + needed)
+        lost = ELSEWHERE.get(one.path) if one.message.startswith("unknown key") else None
+        yield Complaint(one.path, f"unknown key; {lost}" if lost else one.message + needed)
 
 
 def _with_robot_file(plain: Document, provenance: dict[str, Provenance]) -> dict[str, Provenance]:
