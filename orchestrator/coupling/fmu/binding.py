@@ -118,9 +118,9 @@ class Fmi2:
             tail = (seed.ctypes.data, seed.size, out.ctypes.data, out.size)
         return call(unknown.ctypes.data, unknown.size, known.ctypes.data, known.size, *tail)
 
-    def do_step(self, t: float, h: float) -> int:
-        """Advance from `t` to `t + h`; rollback behind `t` stays allowed."""
-        return self._do_step(t, h, 0)
+    def do_step(self, t: float, h: float, forward: bool) -> int:
+        """Advance from `t` to `t + h`; `forward`: no state from before `t` will be restored any more."""
+        return self._do_step(t, h, forward)
 
     def get_state(self, state: SavedState) -> int:
         """Save the FMU's state in `state`."""
@@ -202,9 +202,9 @@ class Fmi3(Fmi2):
         base = self.flags.ctypes.data
         self._out = (base, base + 1, base + 2, self.reached.ctypes.data)
 
-    def do_step(self, t: float, h: float) -> int:
+    def do_step(self, t: float, h: float, forward: bool) -> int:
         """Advance from `t` to `t + h`; a step cut short or a wish to end counts as discard."""
-        status = self._do_step(t, h, False, *self._out)
+        status = self._do_step(t, h, forward, *self._out)
         if status <= WARNING and (self.flags[1] or self.flags[2]):
             self.sink(DISCARD, f"the FMU stopped at {self.reached[0]:g} s")
             return DISCARD

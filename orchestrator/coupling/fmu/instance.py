@@ -37,6 +37,7 @@ from orchestrator.coupling.fmu.driven import Driven
 from orchestrator.coupling.fmu.failure import NOT_FINITE, FmuError
 from orchestrator.coupling.fmu.group import Group
 from orchestrator.coupling.fmu.python_modules import own_modules
+from orchestrator.coupling.fmu.saved_states import SavedStates
 from orchestrator.coupling.fmu.unzipped import unzip
 from orchestrator.coupling.fmu.vocabulary import vocabulary_of
 
@@ -85,6 +86,7 @@ class Fmu:
         self.log: list[str] = []
         self.parameters: dict[str, Value] = {}
         self.driven: Driven | None = None
+        self._states = SavedStates()
         self.solves, self.wall, self.time, self.busy_since = 0, 0.0, 0.0, 0.0
         self.stop = np.nan
         self.worst, self.initialized = 0, False
@@ -255,11 +257,12 @@ class Fmu:
         if self.driven is not None:
             self.driven.set_step(t, h)
         self.busy_since = clock = perf_counter()
-        status = self.fmi.do_step(t, h)
+        status = self.fmi.do_step(t, h, self._states.none_before(t))
         self.wall += perf_counter() - clock
         self.busy_since = 0.0
         if status > WARNING:
             raise self.error(status, f"the step of {digits(h)} s", "" if self.capabilities.variable_step else FIXED)
+        self._states.stepped(t + h)
         if self.driven is not None and self.driven.shown:
             self.driven.set_instant(t + h)
 
@@ -274,6 +277,7 @@ class Fmu:
         status = self.fmi.get_state(state)
         if status > WARNING:
             raise self.error(max(status, ERROR), "saving the state", f"; {FORWARD}")
+        self._states.saved(state)
         return state
 
     def restore(self, state: SavedState) -> None:
@@ -281,9 +285,11 @@ class Fmu:
         status = self.fmi.set_state(state)
         if status > WARNING:
             raise self.error(max(status, ERROR), "restoring the state", f"; {FORWARD}")
+        self._states.restored(state)
 
     def release(self, state: SavedState) -> None:
         """Free a saved state."""
+        self._states.released(state)
         self.fmi.free_state(state)
 
     def close(self) -> None:
