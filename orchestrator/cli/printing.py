@@ -38,6 +38,8 @@ def print_run(run: Run) -> None:
     summary = run.summary
     for note in run.wiring:
         complain(note)
+    for name, count in summary.get("fmu_warnings", {}).items():
+        complain(f"{name}: the FMU has warned {count} times; fmu.log has what it says")
     rows = extremes(run.table, run.tolerances, summary["units"])
     print_table(("signal", "unit", "start", "min", "max", "end"), rows)
     print(

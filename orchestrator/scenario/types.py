@@ -63,7 +63,8 @@ class Simulation(Section):
     """Times in s. `tolerances`: the largest `relative_max_error` that `compare` lets pass, by signal.
 
     `estimate`: by which second run `run` estimates the error of those signals, if any (docs/concepts/error.md). `timeout`: wall
-    time that an FMU may take for one step or its initialisation; none: as long as it likes.
+    time that an FMU may take for one step or its initialisation; none: as long as it likes. `record`: the signals that are
+    kept, ``component.variable``, of any causality; none: all outputs.
     """
 
     stop_time: Annotated[Positive, In("s")]
@@ -73,6 +74,7 @@ class Simulation(Section):
     tolerances: dict[str, Positive] = {}
     estimate: Literal["finer", "coarser", "none"] = "finer"
     timeout: Annotated[Positive | None, In("s")] = None
+    record: Annotated[list[str], Field(min_length=1)] | None = None
 
 
 class CableSection(Section):
@@ -183,11 +185,15 @@ class LimitsSection(Section):
 
 
 class Component(Section):
-    """One FMU of a general graph: any (`fmu`), or one of our modules (`model`)."""
+    """One FMU of a general graph: any (`fmu`), or one of our modules (`model`).
+
+    `continuous`: real variables that it declares discrete, and are not.
+    """
 
     model: str | None = None
     fmu: str | None = None
     steps: Count = 1
+    continuous: list[str] = []
     parameters: Settings = {}
     inputs: Inputs = {}
 
