@@ -243,3 +243,40 @@ def test_all_that_an_fmu_says_is_in_the_run_folder(tmp_path: Path):
         any(line.startswith("a: [error] tyre model failed") for line in lines) and "a: [ok] closing the file" in lines
     )
     assert read_run(out).messages == lines
+
+
+# -- FMI 1.0 -------------------------------------------------------------------------------------------------
+
+
+def lags(**parameters: float) -> Graph:
+    """Return x' = y, y' = -x of two FMUs."""
+    parts = {"x": Fmu(compiled("lag1"), "x"), "y": Fmu(compiled("lag1"), "y")}
+    parts["x"].set_parameters({"start": 1.0} | parameters)
+    parts["y"].set_parameters({"gain": -1.0})
+    return Graph(parts, ["y.y -> x.u", "x.y -> y.u"])
+
+
+@pytest.mark.parametrize("master", ["jacobi", "gauss_seidel"])
+def test_fmi_1_runs_with_explicit_masters_as_fmi_2_does(master: str):
+    """The same equations in both, held inputs: the same numbers to the last bit."""
+    with lags() as graph:
+        old = simulate(graph, master, 0.0, STOP, H)
+    parts = {"x": Fmu(compiled("lag2"), "x"), "y": Fmu(compiled("lag2"), "y")}
+    parts["x"].set_parameters({"start": 1.0})
+    parts["y"].set_parameters({"gain": -1.0})
+    with Graph(parts, ["y.y -> x.u", "x.y -> y.u"]) as graph:
+        new = simulate(graph, master, 0.0, STOP, H)
+    assert np.array_equal(old.signal("x.y"), new.signal("x.y")) and old.signal("x.steps")[-1] == 20.0
+
+
+def test_fmi_1_takes_booleans_and_says_its_faults():
+    with lags(on=False) as graph:
+        assert np.array_equal(simulate(graph, "jacobi", 0.0, STOP, H).signal("x.y"), np.ones(21))
+    with lags(fault=3.0) as graph:
+        log = simulate(graph, "jacobi", 0.0, STOP, H)
+    assert "x, t = 0.6 s: the step of 0.1 s came back with error" in str(log.error)
+
+
+def test_fmi_1_cannot_go_back():
+    with lags() as graph, pytest.raises(ValueError, match="gauss_seidel"):
+        simulate(graph, "iqn_ils", 0.0, STOP, H)

@@ -9,14 +9,21 @@ from __future__ import annotations
 
 import ctypes
 from collections.abc import Callable
-from ctypes import CFUNCTYPE, byref, c_bool, c_double, c_int, c_size_t, c_uint, c_void_p
+from ctypes import CFUNCTYPE, byref, c_bool, c_char, c_double, c_int, c_size_t, c_uint, c_void_p
 from functools import partial
 from pathlib import Path
 from typing import Any, ClassVar
 
 import numpy as np
 from fmpy import calloc, free
-from fmpy.fmi1 import FMICallException
+from fmpy.fmi1 import (
+    FMICallException,
+    FMU1Slave,
+    fmi1CallbackAllocateMemoryTYPE,
+    fmi1CallbackFreeMemoryTYPE,
+    fmi1CallbackFunctions,
+    fmi1CallbackLoggerTYPE,
+)
 from fmpy.fmi2 import (
     FMU2Slave,
     fmi2CallbackAllocateMemoryTYPE,
@@ -76,7 +83,8 @@ class Fmi2:
             instanceName=name,
         )
         self.sink = sink
-        self._logger = logger(sink, final=PYTHONFMU in str(description.generationTool or ""))  # kept as long as the FMU
+        self.python = PYTHONFMU in str(description.generationTool or "")
+        self._logger = logger(sink, final=self.python)  # kept as long as the FMU
         self._instantiate()
         self.component = self.slave.component
         self._do_step = self._raw(f"{self.PREFIX}DoStep", c_double, c_double, c_int)
@@ -134,6 +142,8 @@ class Fmi2:
 
     def asks_for_the_end(self, t: float) -> bool:
         """Return whether a step from `t` that was discarded says that the simulation shall end there."""
+        if self.python:  # each of its discards says so
+            return False
         value = c_int(0)
         return self._boolean_status(TERMINATED, byref(value)) <= WARNING and bool(value.value)
 
@@ -248,6 +258,60 @@ class Fmi3(Fmi2):
     def enter_initialization(self, start: float, stop: float | None) -> int:
         """Enter initialisation."""
         return self._checked(lambda: self.slave.enterInitializationMode(startTime=start, stopTime=stop))
+
+
+class Fmi1(Fmi2):
+    """One FMI 1.0 co-simulation instance: no saved states, no initialisation mode, no derivatives.
+
+    It is initialised with its start values, as the standard has it, and given its inputs afterwards.
+    """
+
+    TYPES: ClassVar[dict[str, tuple[str, type]]] = Fmi2.TYPES | {"Boolean": ("Boolean", np.int8)}
+
+    def __init__(self, description: ModelDescription, folder: Path, name: str, sink: Sink):
+        self._prefix = f"{description.coSimulation.modelIdentifier}_"
+        super().__init__(description, folder, name, sink)
+        self._do_step = self._raw("fmi2DoStep", c_double, c_double, c_char)
+
+    @staticmethod
+    def _load(**arguments: Any) -> Any:
+        return FMU1Slave(**arguments)
+
+    def _instantiate(self) -> None:
+        self._callbacks = fmi1CallbackFunctions()
+        self._callbacks.logger = ctypes.cast(self._logger, fmi1CallbackLoggerTYPE)
+        self._callbacks.allocateMemory = fmi1CallbackAllocateMemoryTYPE(calloc)
+        self._callbacks.freeMemory = fmi1CallbackFreeMemoryTYPE(free)
+        self.slave.instantiate(functions=self._callbacks, loggingOn=True)
+
+    def _raw(self, function: str, *arguments: Any) -> Callable[..., int]:
+        """Return a function of the library, whose name begins with that of the model."""
+        return super()._raw(self._prefix + function.replace("fmi2", "fmi"), *arguments)
+
+    def do_step(self, t: float, h: float, forward: bool) -> int:
+        """Advance from `t` to `t + h`; the last step is never repeated."""
+        return self._do_step(t, h, b"\x01")
+
+    def asks_for_the_end(self, t: float) -> bool:
+        """Return False: the standard knows no such wish."""
+        return False
+
+    def enter_initialization(self, start: float, stop: float | None) -> int:
+        """Initialise."""
+        return self._checked(lambda: self.slave.initialize(start, stop))
+
+    def exit_initialization(self) -> int:
+        """Do nothing: it is initialised."""
+        return OK
+
+    def free(self) -> None:
+        """Free the instance; the library stays loaded (other instances use it)."""
+        self.slave.fmi1FreeSlaveInstance(self.component)
+
+
+def binding_of(version: str) -> type[Fmi2]:
+    """Return the calls of a version of FMI."""
+    return {"1": Fmi1, "3": Fmi3}.get(version[:1], Fmi2)
 
 
 def finalize_python(library: Any) -> None:

@@ -27,9 +27,8 @@ from orchestrator.coupling.fmu.binding import (
     FATAL,
     LABELS,
     WARNING,
-    Fmi2,
-    Fmi3,
     SavedState,
+    binding_of,
     finalize_python,
 )
 from orchestrator.coupling.fmu.description import Port, Value, capabilities_of, ports_of, read_description
@@ -52,7 +51,7 @@ CURES = {DISCARD: SHORTER, NOT_FINITE: SHORTER}
 
 
 class Fmu:
-    """One instance of a co-simulation FMU (FMI 2.0 or 3.0); a context manager that frees it at its end.
+    """One instance of a co-simulation FMU (FMI 1.0, 2.0 or 3.0); a context manager that frees it at its end.
 
     Parameters
     ----------
@@ -94,7 +93,7 @@ class Fmu:
         self.worst, self.initialized = 0, False
         _require_possible(self)
         self.abandoned = False
-        binding = Fmi3 if str(self.description.fmiVersion).startswith("3") else Fmi2
+        binding = binding_of(str(self.description.fmiVersion))
         try:
             self.folder = unzip(self.path, self.sha256)
             loaded = [other.folder for other in _instances]
