@@ -220,6 +220,23 @@ def test_without_a_numeric_output_a_run_ends_properly(tmp_path: Path):
     assert any("no FMU has a numeric output" in note for note in run.wiring)
 
 
+def test_a_graph_can_start_late(tmp_path: Path):
+    """The same equations two seconds later: x' = -x does not know the time."""
+    path = written(tmp_path, compiled("letter2"), more=', start_time = 2.0, tolerances = { "a.x" = 1e-3 }')
+    path.write_text(
+        path.read_text().replace("stop_time = 2.0", "stop_time = 4.0").replace('"none"', '"finer"'), encoding="utf-8"
+    )
+    late, early = orchestrator.run(path), orchestrator.run(written(tmp_path, compiled("letter2")))
+    assert late.time[0] == 2.0 and late.time[-1] == 4.0 and late.summary["simulated_s"] == 2.0
+    assert np.allclose(late.table["a.x"], early.table["a.x"], rtol=0.0, atol=1e-12)
+    assert late.estimated_error and all(np.isfinite([*late.estimated_error.values()]))
+
+
+def test_a_landing_starts_at_zero():
+    with pytest.raises(InputError, match=r"simulation\.start_time: a landing starts at 0 s"):
+        orchestrator.load_scenario("landing_200m_point9", set={"simulation.start_time": 1.0})
+
+
 def test_a_step_below_its_own_is_said(tmp_path: Path):
     own = described(
         compiled("letter2"), tmp_path, ("<ModelVariables>", '<DefaultExperiment stepSize="0.5"/><ModelVariables>')

@@ -132,7 +132,7 @@ def _simulated(scenario: Scenario, graph: Graph, progress: Reached) -> Log:
 
         master = master_of(scenario, graph)
         try:
-            times = 0.0, simulation.stop_time, simulation.macro_step
+            times = simulation.start_time, simulation.stop_time, simulation.macro_step
             return simulate(graph, master, *times, recorded(graph, scenario), on_step, simulation.timeout)
         except (ValueError, TypeError) as error:
             raise InputError(f"{scenario.path}: {error}") from None
