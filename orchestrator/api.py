@@ -170,6 +170,7 @@ def sweep(
     workers: int | None = None,
     timeout: float | None = None,
     progress: Callable[[int, int, int], None] | None = None,
+    dask: str | None = None,
 ) -> Sweep:
     """Run many landings in worker processes; what a sweep in `out` has made already is not made again.
 
@@ -182,6 +183,7 @@ def sweep(
     workers : processes; None: one a processor
     timeout : s that a run may take; None: the study's
     progress : told how many runs are done, of how many, and how many failed
+    dask : address of a Dask scheduler, whose workers make the runs; None: this machine does
 
     Raises
     ------
@@ -189,7 +191,7 @@ def sweep(
     """
     from orchestrator.studies.sweep.result import run as run_all  # with what only studies need
 
-    return run_all(study, out, workers, timeout, progress or (lambda done, of, failed: None))
+    return run_all(study, out, workers, timeout, progress or (lambda done, of, failed: None), dask)
 
 
 def load_scenario(

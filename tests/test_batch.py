@@ -13,8 +13,9 @@ import numpy as np
 import pytest
 
 from orchestrator.coupling.errors import InputError
-from orchestrator.runs.batch import ONE_THREAD, run_batch
+from orchestrator.runs.batch import run_batch
 from orchestrator.runs.job import Job, found, make
+from orchestrator.runs.worker import ONE_THREAD
 
 
 def job(stop: float = 0.2, **options) -> Job:
@@ -139,3 +140,13 @@ def test_a_batch_that_was_killed_goes_on(tmp_path: Path, number: int):
     assert int(again.stdout.splitlines()[0]) >= 3 and again.stdout.splitlines()[-1] == "40"
     after = {path.parent.name: path.stat().st_mtime_ns for path in store.glob("*/manifest.json")}
     assert len(after) == 40 and {name: after[name] for name in made} == made, "none is made twice"
+
+
+def test_a_run_of_a_batch_is_bit_for_bit_that_run_alone(tmp_path: Path):
+    """What is solved once for several runs, the line at rest for one, changes none of them."""
+    values = {"simulation.stop_time": 0.05}
+    jobs = [Job("landing_200m_point9", values | {"landing.height": height}) for height in (0.01, 0.02)]
+    run_batch(jobs, tmp_path / "batch", 1)
+    make(jobs[1], tmp_path / "alone")
+    one, other = (tmp_path / place / jobs[1].key / "results.csv" for place in ("batch", "alone"))
+    assert one.read_bytes() == other.read_bytes()

@@ -10,6 +10,7 @@ from typing import Any
 import numpy as np
 import pytest
 
+POSITION, MASS = "landing.position", "robot.parameters.mass"
 FOLDER = Path(__file__).resolve().parents[1] / "examples"
 
 
@@ -17,7 +18,7 @@ FOLDER = Path(__file__).resolve().parents[1] / "examples"
 def example(tmp_path: Path, monkeypatch: pytest.MonkeyPatch) -> Any:
     """Run an example by name and return its variables."""
     monkeypatch.chdir(tmp_path)
-    return lambda name: runpy.run_path(str(FOLDER / f"{name}.py"))
+    return lambda name, **options: runpy.run_path(str(FOLDER / f"{name}.py"), **options)
 
 
 def test_a_landing_swings_down_and_says_how_wrong_it_is(example: Any) -> None:
@@ -56,6 +57,19 @@ def test_the_implicit_master_is_of_order_4_and_the_explicit_one_of_order_1(examp
     orders = example("compare_masters")["comparison"].observed_order
     assert orders["iqn_ils"]["left.position"] == pytest.approx(4.0, abs=0.2)
     assert orders["gauss_seidel"]["left.position"] == pytest.approx(1.0, abs=0.2)
+
+
+def test_a_study_finds_where_it_is_safe_how_surely_and_why(example: Any) -> None:
+    shown = example("sweep_study", run_name="__main__")
+    study, near = shown["study"], shown["near"]
+    safe = {(p, m): s == 1.0 for p, m, s in zip(*(study.table[k] for k in (POSITION, MASS, "safe")), strict=True)}
+    assert all(safe[p, 38.0] for p in (20.0, 60.0, 100.0)) and safe[20.0, 90.0] and not safe[100.0, 90.0]
+    added = {p for p, m in safe if m == 90.0} - {20.0, 60.0, 100.0}
+    assert added == {40.0}, "between 20 m, where 90 kg are safe, and 60 m"
+    assert shown["chance"].count == 40 and len(near.table["run"]) == 40 + 8 * (2 + 2)
+    indices = near.sensitivity[0].of["least_margin"]
+    assert indices[MASS].total.estimate > indices["cable.parameters.mass_damping"].total.estimate
+    assert Path("map.pdf").read_bytes().startswith(b"%PDF")
 
 
 def test_every_example_is_tested_and_listed() -> None:

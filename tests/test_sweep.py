@@ -154,6 +154,21 @@ def test_a_monolithic_run_is_judged_as_a_coupled_one(tmp_path: Path):
         )
 
 
+def test_the_table_as_parquet_is_the_csv(tmp_path: Path):
+    pyarrow = pytest.importorskip(
+        "pyarrow.parquet", reason="pyarrow is not installed: pip install 'line-landing[frames]'"
+    )
+    rows = [
+        {"run": 1, "safe": True, "least_margin": 0.25, "binding": "z", "failure": ""},
+        {"run": 2, "safe": None, "least_margin": None, "binding": "", "failure": "it hung"},
+    ]
+    write.write_rows(tmp_path / "table.csv", rows)
+    write.write_parquet(tmp_path / "table.parquet", tmp_path / "table.csv")
+    found = pyarrow.read_table(tmp_path / "table.parquet").to_pydict()
+    assert found["run"] == [1.0, 2.0] and found["safe"] == [1.0, None] and found["least_margin"] == [0.25, None]
+    assert found["binding"] == ["z", ""] and found["failure"] == ["", "it hung"]
+
+
 # -- what goes wrong ------------------------------------------------------------------------------------------------
 
 

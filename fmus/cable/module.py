@@ -2,6 +2,8 @@
 
 from __future__ import annotations
 
+from functools import lru_cache
+
 import numpy as np
 
 from fmus.cable import dynamics, ports
@@ -30,6 +32,8 @@ N_NODES = 64
 """Nodes that are shown, with their slopes: all of a mesh that has no more, else as many of them, spread evenly."""
 N_CATENARY = 401
 """Points of the catenary on which landing points are found: to 1e-5 of the length, a mesh asks for no more."""
+REMEMBERED = 16
+"""Lines at rest that are kept: those of a run, and of runs that differ in what does not touch them."""
 
 
 _PARAMETERS = [
@@ -221,9 +225,7 @@ class Cable:
             raise ModuleError(
                 "cable: drag_coefficient: the drag of the air needs the line's diameter; set diameter, in m"
             )
-        if self["sag"] > 0.0:
-            self.values[self.table.index["unstretched_length"]] = self._length_for_sag()
-        self.model, q = self._rest(self["unstretched_length"])
+        self.values[self.table.index["unstretched_length"]], self.model, q = self._settled()
         n = q.size
         self.state = np.zeros(state_size(n))
         self.state[:n] = q
@@ -238,6 +240,12 @@ class Cable:
         self._diagnose(np.zeros_like(self._ports))  # at rest, before any load
         self._shown_ports[:, ports.MEANS : ports.PORT_WORK] = self._shown_ports[:, :6]
         self._shown_ports[:, ports.PORT_WORK] = 0.0
+
+    def _settled(self) -> tuple[float, Model, np.ndarray]:
+        """Return unstretched length, cable and equilibrium (n,): solved once in a process for equal parameters."""
+        length, model, q = _equilibrium_of(self.values[self.table.indices(self.table.names("parameter"))].tobytes())
+        own = {name: value.copy() for name, value in model._asdict().items() if isinstance(value, np.ndarray)}
+        return length, model._replace(**own), q.copy()
 
     def _rest(self, length: float) -> tuple[Model, np.ndarray]:
         """Return the cable of the given unstretched length and its equilibrium (n,)."""
@@ -373,3 +381,12 @@ class Cable:
     def _show_nodes(self) -> None:
         """Write position and slope of the nodes that are shown."""
         self._nodes_shown[:] = self.state[: self.model.weight.size].reshape(-1, 6)[self._nodes_at]
+
+
+@lru_cache(maxsize=REMEMBERED)
+def _equilibrium_of(parameters: bytes) -> tuple[float, Model, np.ndarray]:
+    """Return unstretched length, cable and equilibrium (n,) with these parameters, in the order of the table."""
+    cable = Cable()
+    cable.values[cable.table.indices(cable.table.names("parameter"))] = np.frombuffer(parameters)
+    length = cable._length_for_sag() if cable["sag"] > 0.0 else cable["unstretched_length"]
+    return length, *cable._rest(length)

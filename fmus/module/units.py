@@ -12,6 +12,7 @@ import re
 import sys
 from dataclasses import dataclass, field
 from fractions import Fraction
+from functools import lru_cache
 
 PI = Fraction("3.14159265358979323846264338327950288419716939937511")
 """To 50 digits: what is rounded to a float at the end is pi for that purpose."""
@@ -91,6 +92,7 @@ class Unit:
         return Unit(self.factor * other.factor**power, {b: n for b, n in sums.items() if n})
 
 
+@lru_cache(maxsize=1024)
 def unit(text: str) -> Unit | None:
     """Return the unit of `text`; None where it is unknown, or not fixed (``N/m^n``).
 

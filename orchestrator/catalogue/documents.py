@@ -97,36 +97,49 @@ def leaves(document: Document, prefix: str = "") -> Iterator[str]:
             yield prefix + key
 
 
-_texts: ContextVar[dict[Path, str] | None] = ContextVar("texts", default=None)
+_known: ContextVar[dict[Path, Document] | None] = ContextVar("known", default=None)
 
 
 @contextmanager
 def read_once() -> Iterator[None]:
     """Within it each file is read once, so that a command sees one state of it, however many ask."""
-    if _texts.get() is not None:
+    if _known.get() is not None:
         yield
         return
-    token = _texts.set({})
+    token = _known.set({})
     try:
         yield
     finally:
-        _texts.reset(token)
+        _known.reset(token)
 
 
-def _text(path: Path) -> str:
-    known = _texts.get()
+def read_once_from_now_on() -> None:
+    """Read each file once until this process ends."""
+    _known.set({})
+
+
+def _parsed(path: Path) -> Document:
+    """Return the content of a file, which whoever asks may change."""
+    known = _known.get()
     if known is None:
-        return path.read_text(encoding="utf-8")
+        return tomllib.loads(path.read_text(encoding="utf-8"))
     place = path.resolve()
     if place not in known:
-        known[place] = path.read_text(encoding="utf-8")
-    return known[place]
+        known[place] = tomllib.loads(path.read_text(encoding="utf-8"))
+    return _copied(known[place])
+
+
+def _copied(content: Any) -> Any:
+    """Return tables and arrays anew; other values of a TOML file cannot be changed."""
+    if isinstance(content, dict):
+        return {key: _copied(value) for key, value in content.items()}
+    return [_copied(value) for value in content] if isinstance(content, list) else content
 
 
 def read(path: Path) -> Document:
     """Return the content of a TOML file; `InputError` names file, cause and cure."""
     try:
-        return tomllib.loads(_text(path))
+        return _parsed(path)
     except OSError as error:
         raise InputError(f"{path}: cannot be read ({error.strerror}); check the path") from None
     except UnicodeDecodeError as error:

@@ -4,6 +4,7 @@ from __future__ import annotations
 
 from collections.abc import Callable, Iterator
 from contextlib import contextmanager
+from itertools import chain
 from pathlib import Path
 from typing import TYPE_CHECKING, Annotated
 
@@ -23,6 +24,9 @@ def sweep(
     ] = None,
     workers: Annotated[int | None, typer.Option(min=1, help="Processes. Default: one a processor.")] = None,
     timeout: Annotated[float | None, typer.Option(help="Seconds that a run may take. Default: the study's.")] = None,
+    dask: Annotated[
+        str | None, typer.Option(metavar="ADDRESS", help="Dask scheduler whose workers make the runs. Default: here.")
+    ] = None,
     quiet: options.Quiet = False,
 ) -> None:
     """Run a scenario with many values: which landings are safe, by which margin, and how probably.
@@ -31,31 +35,36 @@ def sweep(
     """
     with importing():
         from orchestrator.coupling.errors import DONE, MISSED
-        from orchestrator.studies.sweep import maps, write
+        from orchestrator.studies.sweep import bars, maps, odds, write
         from orchestrator.studies.sweep.solve import sweep as run_all
         from orchestrator.studies.sweep.study import load_study, path_of
 
     read = load_study(path_of(study))
     folder = write.place_of(out, read)
     with _bar(quiet) as told:
-        found = run_all(read, folder / write.STORE, lambda swept: write.save(folder, swept), workers, timeout, told)
+        found = run_all(
+            read, folder / write.STORE, lambda swept: write.save(folder, swept), workers, timeout, told, dask
+        )
     _print(found)
     print(f"table in {folder / write.TABLE}")
-    for path in maps.write(folder, read, found.outcomes):
-        print(f"map in {path}")
+    drawn = maps.write(folder, read, found.outcomes), odds.write(folder, read, found.chances)
+    for path in [*chain(*drawn), *bars.write(folder, found.sensitivities)]:
+        print(f"picture in {path}")
     raise typer.Exit(MISSED if found.failed else DONE)
 
 
 def _print(found: Swept) -> None:
     """Print how many are safe, how probably, and which runs failed."""
-    from orchestrator.studies.sweep import write
+    from orchestrator.studies.sweep import odds, write
     from orchestrator.studies.sweep.ranges import all_ranges
 
     print(write.said(found))
-    for line in all_ranges(found.study, found.outcomes):
+    for line in [*all_ranges(found.study, found.outcomes), *odds.words(found.study, found.chances)]:
         print(line)
     if found.chances:
         printing.print_table(write.CHANCES, write.chance_rows(found))
+    if found.sensitivities:
+        printing.print_table(write.INDICES, write.index_rows(found))
     for outcome in found.failed:
         printing.complain(f"run {outcome.row.number}: {outcome.done.failure}")
 

@@ -141,7 +141,8 @@ class Safety:
         exceeded, unclear = self.named("exceeded"), self.named("unclear")
         why = [f"{', '.join(exceeded)} exceeded"] if exceeded else []
         why += [f"margin of {', '.join(unclear)} smaller than the estimated error"] if unclear else []
-        return f"NOT {'' if exceeded or self.faults else 'CLEARLY '}SAFE {until}: {'; '.join([*why, *self.faults])}"
+        start = "NOT SAFE" if exceeded or self.faults else NOT_CLEAR
+        return f"{start} {until}: {'; '.join([*why, *self.faults])}"
 
     def content(self) -> dict[str, Any]:
         """Return what ``summary.json`` says of it."""
@@ -315,6 +316,12 @@ def rows(safety: Mapping[str, Any]) -> Iterator[tuple[str, ...]]:
         yield name, unit, *shown, f"{judged['time']:.4g}", wheel, VERDICTS[judged["verdict"]]
 
 
+def is_exceeded(safety: Mapping[str, Any]) -> bool:
+    """Whether the landing of a ``summary.json`` is known to be unsafe; else what is not safe has errors too large."""
+    exceeded = any(judged["verdict"] == "exceeded" for judged in safety["limits"].values())
+    return exceeded or not str(safety.get("safety", "")).startswith(NOT_CLEAR)
+
+
 def why_not_judged(safety: Mapping[str, Any]) -> Iterator[str]:
     """Yield the limits that a ``summary.json`` does not judge, a line for each reason."""
     reasons = dict[str, list[str]]()
@@ -323,6 +330,8 @@ def why_not_judged(safety: Mapping[str, Any]) -> Iterator[str]:
     yield from (f"{', '.join(names)} ({why})" for why, names in reasons.items())
 
 
+NOT_CLEAR = "NOT CLEARLY SAFE"
+"""Begins the words on a landing whose margin is smaller than its estimated error."""
 NOISE = 1e-9
 """Smaller values say nothing, in any unit."""
 HEAD = ("limit", "unit", "worst", "allowed", "margin", "at [s]", "wheel", "verdict")

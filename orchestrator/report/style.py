@@ -123,3 +123,12 @@ def decades(axis: Axes) -> None:
 def above_zero(values: np.ndarray) -> np.ndarray:
     """Return `values` with zeros left out, which a logarithmic axis cannot show."""
     return np.where(values > 0.0, values, np.nan)
+
+
+def save_figure(figure: Figure, place: Path) -> list[Path]:
+    """Write a figure as PNG, and as PDF for a paper; return the paths: `place` with their endings."""
+    paths = [place.with_suffix(f".{kind}") for kind in ("png", "pdf")]
+    for path in paths:
+        with replacing(path) as temporary, matplotlib.rc_context(STYLE):
+            figure.savefig(temporary, dpi=STYLE["savefig.dpi"])
+    return paths

@@ -6,28 +6,39 @@ batch that was interrupted goes on where it was.
 
 from __future__ import annotations
 
+import errno
 import os
-from collections.abc import Callable, Iterator, Sequence
+import shutil
+import tempfile
+import threading
+from collections.abc import Callable, Iterable, Iterator, Mapping, Sequence
 from concurrent.futures import Future, as_completed
 from concurrent.futures import TimeoutError as RanTooLong
-from contextlib import ExitStack, contextmanager
-from multiprocessing import get_context
+from concurrent.futures.process import BrokenProcessPool
+from contextlib import ExitStack
+from multiprocessing import current_process
 from pathlib import Path
-from typing import Any, Self
+from typing import TYPE_CHECKING, Any, Self
 
 from pebble import ProcessExpired, ProcessPool
 
 from fmus.face.first_use import compile_modules
 from fmus.kernels.jit import is_compiled
 from orchestrator.coupling.errors import InputError
-from orchestrator.runs.job import Done, Job, found, make
+from orchestrator.runs import cluster, worker
+from orchestrator.runs.job import Done, Job, code_version, found, make, remove_half_done
 from orchestrator.scenario.types import LandingScenario
+
+if TYPE_CHECKING:
+    from distributed import Client
 
 Counted = Callable[[int, int], None]
 """Told how many runs are done, and of how many."""
 Ended = Callable[[Done], None]
 """Told of each run as it has ended."""
-ONE_THREAD = ("OPENBLAS_NUM_THREADS", "OMP_NUM_THREADS", "MKL_NUM_THREADS", "VECLIB_MAXIMUM_THREADS")
+NO_ROOM = (errno.ENOSPC, errno.EDQUOT, errno.EFBIG)
+ATTEMPTS = 5
+"""With new workers, where all were lost at once."""
 COMPILED = {"monolithic": "orchestrator.landing.monolithic", "coupled": "fmus.cable"}
 """The package whose kernels each solver needs last."""
 
@@ -60,19 +71,22 @@ def run_batch(
 class Batches:
     """Batches one after another with the same workers, which are started with the first run that has to be made.
 
-    Parameters as for `run_batch`.
+    Parameters as for `run_batch`; `dask`: address of a scheduler, whose workers make the runs in the place of this machine.
     """
 
-    def __init__(self, store: Path, workers: int | None = None, timeout: float | None = None):
-        self.store, self.workers, self.timeout = store, workers or _processors(), timeout
+    def __init__(self, store: Path, workers: int | None = None, timeout: float | None = None, dask: str | None = None):
+        self.store, self.workers, self.timeout, self.dask = store, workers or _processors(), timeout, dask
         self._open = ExitStack()
         self._pool: ProcessPool | None = None
+        self._client: Client | None = None
 
     def __enter__(self) -> Self:
+        if self.dask is not None:
+            self._client = self._open.enter_context(cluster.connected(self.dask))
         return self
 
     def __exit__(self, *error: Any) -> None:
-        self._pool = None
+        self._pool = self._client = None
         self._open.__exit__(*error)
 
     def run(
@@ -96,23 +110,55 @@ class Batches:
         return [Done(job, ready[key].directory, ready[key].failure) for key, job in zip(keys, jobs, strict=True)]
 
     def _made(self, left: dict[str, Job]) -> Iterator[tuple[str, Done]]:
-        """Yield each run of `left` as it is finished."""
+        """Yield each run of `left` as it is finished; those that have left nothing before come last."""
+        alone, lost = self._compiling(left), {key for key in left if _lost(self.store, key).is_file()}
+        others = sorted((key for key in left if key not in alone), key=lambda key: key in lost)
+        solvers = {job.solver for job in left.values()}
+        yield from self._tried({key: left[key] for key in alone}, solvers, None)
+        yield from self._tried({key: left[key] for key in others}, solvers, self.timeout)
+
+    def _compiling(self, left: Mapping[str, Job]) -> list[str]:
+        """Return the runs that go first and alone: they compile what the others load, if that is not done yet."""
+        if self.dask is not None:  # each machine does so for itself
+            return []
         if any(isinstance(job.loaded(), LandingScenario) for job in left.values()):
             compile_modules()
-        pool, alone = self._started(), _first_of_its_kind(left)
-        for keys, limit in ((alone, None), ([key for key in left if key not in alone], self.timeout)):
-            futures: dict[Future[None], str] = {
-                pool.schedule(make, args=(left[key], self.store), timeout=limit): key for key in keys
-            }
-            for future in as_completed(futures):
-                key = futures[future]
-                yield key, _ended(left[key], self.store, future)
+        return _first_of_its_kind(left)
 
-    def _started(self) -> ProcessPool:
+    def _tried(self, left: dict[str, Job], solvers: Iterable[str], limit: float | None) -> Iterator[tuple[str, Done]]:
+        """Yield each run of `left`; should all workers be lost at once, the rest is given to new ones."""
+        for attempt in range(ATTEMPTS):
+            for key, future in self._ended(left, solvers, limit):
+                if isinstance(future.exception(), BrokenProcessPool) and attempt + 1 < ATTEMPTS:
+                    continue
+                yield key, _outcome(left.pop(key), self.store, future)
+            if not left:
+                return
+            self._pool = None
+            self._open.pop_all().close()
+
+    def _ended(
+        self, left: Mapping[str, Job], solvers: Iterable[str], limit: float | None
+    ) -> Iterator[tuple[str, Future[None]]]:
+        """Yield what has ended, however that was."""
+        if not left:
+            return
+        if self._client is not None:
+            yield from cluster.ended(self._client, make_elsewhere, left, self.store, limit)
+            return
+        pool = self._started(solvers)
+        futures: dict[Future[None], str] = {
+            pool.schedule(make, args=(job, self.store), timeout=limit): key for key, job in left.items()
+        }
+        for future in as_completed(futures):
+            yield futures[future], future
+
+    def _started(self, solvers: Iterable[str]) -> ProcessPool:
         """Return the workers, started if they are not yet."""
         if self._pool is None:
             self.store.mkdir(parents=True, exist_ok=True)
-            self._pool = self._open.enter_context(_pool(self.workers))
+            remove_half_done(self.store)
+            self._pool = self._open.enter_context(worker.pool(self.workers, solvers))
         return self._pool
 
 
@@ -134,58 +180,86 @@ def _processors() -> int:
     return len(count(0)) if count else os.cpu_count() or 1
 
 
-def _first_of_its_kind(left: dict[str, Job]) -> list[str]:
+def _first_of_its_kind(left: Mapping[str, Job]) -> list[str]:
     """Return the runs that go first, alone and without a time limit: they compile the kernels that the others load."""
-    kinds = {job.solver: key for key, job in reversed(left.items())}
+    kinds = {job.solver: key for key, job in reversed([*left.items()])}
     return [key for solver, key in kinds.items() if not is_compiled(COMPILED[solver])]
 
 
-@contextmanager
-def _pool(workers: int) -> Iterator[ProcessPool]:
-    """Give worker processes with one BLAS thread each; what still runs at an interruption is ended."""
-    with _one_thread():
-        pool = ProcessPool(workers, initializer=_begin, context=get_context("spawn"))  # type: ignore[arg-type]
-        try:
-            yield pool
-            pool.close()
-        except BaseException:
-            pool.stop()
-            raise
-        finally:
-            pool.join()
+def _outcome(job: Job, store: Path, future: Future[Any]) -> Done:
+    """Return how a run has ended; one that left nothing will be tried again by the next batch, last of all.
+
+    Raises
+    ------
+    OSError : there is no room for its results, nor for those of others
+    """
+    failure = _failure(future.exception())
+    done = found(job, store) if failure is None else None
+    if done is None:
+        done = Done(job, None, failure or "left no results")
+        _lost(store, job.key).write_text(str(done.failure), encoding="utf-8")
+    else:
+        _lost(store, job.key).unlink(missing_ok=True)
+    return done
 
 
-@contextmanager
-def _one_thread() -> Iterator[None]:
-    """Let the processes started within have one thread each: a library reads that as it is loaded."""
-    before = {name: os.environ.get(name) for name in ONE_THREAD}
-    os.environ.update(dict.fromkeys(ONE_THREAD, "1"))
+def _failure(error: BaseException | None) -> str | None:
+    """Return why a run has left nothing; None where it came to its end."""
+    match error:
+        case None:
+            return None
+        case RanTooLong():
+            return "took longer than it may, and was ended; give it more time (timeout)"
+        case ProcessExpired():
+            return f"its process died (exit code {error.exitcode}); run the scenario alone to see why"
+        case cluster.LostError():
+            return str(error)
+        case OSError() if error.errno in NO_ROOM:
+            raise error
+        case _:  # whatever it is, it is that run's alone
+            return f"{type(error).__name__}: {error}"
+
+
+def _lost(store: Path, key: str) -> Path:
+    """Return the file that says why a run has left nothing."""
+    return store / f"{key}.failed"
+
+
+# -- in a Dask worker -------------------------------------------------------------------------------------------
+
+
+_here = threading.local()
+"""Of a thread of a Dask worker: its child, which is kept from run to run."""
+
+
+def make_elsewhere(job: Job, key: str, version: str, limit: float | None) -> tuple[cluster.Packed | None, str]:
+    """Make a run in a child of this process; return its folder, or why it has left nothing."""
+    if version != code_version():
+        return (
+            None,
+            "the cluster's worker has another version of this program, or of its libraries; install the same there",
+        )
     try:
-        yield
-    finally:
-        for name, value in before.items():
-            os.environ.pop(name) if value is None else os.environ.update({name: value})
+        if job.key != key:
+            return None, f"{job.scenario}: the cluster's worker has other files under the same paths; share a folder"
+    except InputError as error:
+        return None, f"on the cluster's worker: {error}"
+    batches = _batches()
+    batches.timeout = limit
+    (done,) = batches.run([job])
+    if done.directory is None:
+        return None, str(done.failure)
+    packed = {file.name: file.read_bytes() for file in done.directory.iterdir()}
+    shutil.rmtree(done.directory)
+    return packed, ""
 
 
-def _begin() -> None:
-    """Leave Ctrl-C to the process that has started this one, and say nothing on its terminal."""
-    import signal
-
-    from fmus.kernels import notice
-
-    signal.signal(signal.SIGINT, signal.SIG_IGN)
-    notice.muted = True
-
-
-def _ended(job: Job, store: Path, future: Future[Any]) -> Done:
-    """Return how a run has ended; one that left nothing will be tried again by the next batch."""
-    try:
-        future.result()
-    except RanTooLong:
-        return Done(job, None, "took longer than it may, and was ended; give it more time (timeout)")
-    except ProcessExpired as error:
-        return Done(job, None, f"its process died (exit code {error.exitcode}); run the scenario alone to see why")
-    except Exception as error:  # whatever it is, it is that run's alone
-        return Done(job, None, f"{type(error).__name__}: {error}")
-    done = found(job, store)
-    return done if done is not None else Done(job, None, "left no results; is the disk full?")
+def _batches() -> Batches:
+    """Return what makes runs in a child of this thread."""
+    if not hasattr(_here, "batches"):
+        current_process().daemon = (
+            False  # Dask's workers are daemons, which may have no children; this one ends with it
+        )
+        _here.folder = tempfile.TemporaryDirectory(prefix="line-landing-")
+        _here.batches = Batches(Path(_here.folder.name), 1)
+    return _here.batches

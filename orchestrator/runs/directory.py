@@ -7,6 +7,7 @@ import subprocess
 import time
 from collections.abc import Iterable, Iterator, Mapping
 from contextlib import contextmanager, suppress
+from functools import cache
 from importlib.metadata import PackageNotFoundError, version
 from itertools import count
 from pathlib import Path
@@ -105,11 +106,17 @@ def circumstances() -> dict[str, Any]:
     """Return what a run depends on beside its scenario: versions, commit, platform, date."""
     return {
         "written": time.strftime("%Y-%m-%dT%H:%M:%S%z"),
-        "versions": {"python": platform.python_version(), **{p: _version(p) for p in PACKAGES}},
-        "commit": _commit(),
+        **_program(),
         "platform": platform.platform(),
         "processor": platform.machine(),
     }
+
+
+@cache
+def _program() -> dict[str, Any]:
+    """Return versions and commit, as they were when this process first asked."""
+    versions = {"python": platform.python_version(), **{package: _version(package) for package in PACKAGES}}
+    return {"versions": versions, "commit": _commit()}
 
 
 def _version(package: str) -> str | None:

@@ -10,7 +10,9 @@ import hashlib
 import json
 import os
 import shutil
-from collections.abc import Callable, Mapping
+import time
+from collections.abc import Callable, Iterator, Mapping
+from contextlib import contextmanager
 from dataclasses import asdict, dataclass, field
 from functools import cache, cached_property
 from pathlib import Path
@@ -161,20 +163,50 @@ def found(job: Job, store: Path) -> Done | None:
 
 def make(job: Job, store: Path) -> None:
     """Run `job` and put its folder into `store`, whole or not at all; a run that fails leaves a folder that says why."""
-    scenario = job.loaded()
+    start, scenario = time.process_time(), job.loaded()
     failure, table, summary = None, {}, {}
     try:
         table, summary = SOLVERS[job.solver](job, scenario)
     except (InputError, ModuleError, RunError) as error:
         failure = str(error)
-    temporary = store / f".{job.key}.{os.getpid()}"
+    with put(store, job.key) as directory:
+        if table:
+            directory.write_table("results.csv", table)
+        directory.write_json("summary.json", summary)
+        directory.write_manifest(_manifest(job, scenario) | {"cpu_s": time.process_time() - start}, failure)
+
+
+@contextmanager
+def put(store: Path, key: str) -> Iterator[RunDirectory]:
+    """Give a folder that is moved into place when it is whole, and removed when it does not come to that."""
+    temporary = store / f".{key}.{os.getpid()}"
     shutil.rmtree(temporary, ignore_errors=True)
-    directory = RunDirectory(temporary)
-    if table:
-        directory.write_table("results.csv", table)
-    directory.write_json("summary.json", summary)
-    directory.write_manifest(_manifest(job, scenario), failure)
-    _move(temporary, store / job.key)
+    try:
+        yield RunDirectory(temporary)
+        _move(temporary, store / key)
+    except BaseException:
+        shutil.rmtree(temporary, ignore_errors=True)
+        raise
+
+
+def remove_half_done(store: Path) -> None:
+    """Remove what runs have left in `store` whose process is no more: it was killed, or the disk was full."""
+    for folder in store.glob(".*.*"):
+        process = folder.suffix.removeprefix(".")
+        if process.isdecimal() and not _is_running(int(process)):
+            shutil.rmtree(folder, ignore_errors=True)
+
+
+def _is_running(process: int) -> bool:
+    if os.name != "posix":  # elsewhere to ask is to end it
+        return True
+    try:
+        os.kill(process, 0)
+    except ProcessLookupError:
+        return False
+    except OSError:  # it is another user's, or the system cannot tell
+        return True
+    return True
 
 
 def _manifest(job: Job, scenario: Scenario) -> dict[str, Any]:

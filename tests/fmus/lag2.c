@@ -2,12 +2,13 @@
  * A step takes `duration` s of sleep, or -`duration` s of work; from `fault_time` on it comes back with status `fault`, if
  * that is one; the other faults are named below. */
 #define _POSIX_C_SOURCE 200809L
+#include <signal.h>
 #include <stdlib.h>
 #include <string.h>
 #include <time.h>
 
 typedef struct { double u, x, gain, duration, fault, fault_time; } Lag;
-enum { NOT_A_NUMBER = 10, FORGETS, NO_RESTORE, NO_SAVE, NO_INPUT, NO_START, NO_END_OF_START };
+enum { NOT_A_NUMBER = 10, FORGETS, NO_RESTORE, NO_SAVE, NO_INPUT, NO_START, NO_END_OF_START, CRASHES = 20, HANGS };
 enum { VR_U = 1, VR_Y = 2, VR_GAIN = 3, VR_START = 4, VR_DURATION, VR_FAULT, VR_FAULT_TIME, OK = 0, ERROR = 3 };
 
 const char *fmi2GetVersion(void) { return "2.0"; }
@@ -71,6 +72,8 @@ int fmi2DoStep(void *c, double t, double h, int no_rollback) {
     Lag *lag = c;
     if (lag->duration != 0) take(lag->duration);
     lag->x += h * lag->gain * lag->u;
+    if (lag->fault == CRASHES && t >= lag->fault_time) raise(SIGSEGV);
+    while (lag->fault == HANGS && t >= lag->fault_time) {}
     if (t < lag->fault_time || lag->fault > NOT_A_NUMBER) return OK;
     if (lag->fault == NOT_A_NUMBER) lag->x = 0.0 / 0.0;
     return lag->fault == NOT_A_NUMBER ? OK : (int)lag->fault;

@@ -4,6 +4,7 @@ from __future__ import annotations
 
 import operator
 from collections.abc import Iterator
+from functools import cache
 from inspect import signature
 from typing import Any, get_type_hints
 
@@ -21,7 +22,7 @@ def master_options() -> dict[str, dict[str, Any]]:
     """Return the options of every master, with their default values, by its name."""
     from orchestrator.coupling.masters import MASTERS
 
-    return {name: _options(master) for name, master in MASTERS.items()}
+    return {name: dict(_options(master)) for name, master in MASTERS.items()}
 
 
 def out_of_bounds(master: str, option: str, value: float) -> str:
@@ -42,6 +43,7 @@ def _broken(bounds: tuple[Any, ...], value: float) -> Iterator[str]:
                 yield f"{words} {getattr(bound, name):g}"
 
 
+@cache
 def _options(master: type) -> dict[str, Any]:
     """Return the keyword arguments of `master`; those that it hands on are its base class's."""
     found: dict[str, Any] = {}

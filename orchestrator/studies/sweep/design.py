@@ -2,7 +2,7 @@
 
 from __future__ import annotations
 
-from collections.abc import Iterator, Mapping
+from collections.abc import Iterator, Mapping, Sequence
 from dataclasses import dataclass
 from itertools import product
 from pathlib import Path
@@ -13,6 +13,9 @@ from scipy.stats import qmc
 
 from orchestrator.runs.job import Job
 from orchestrator.studies.sweep.study import EXTREMES, Sample, Study
+
+A, B = "A", "B"
+"""Parts of the points of sensitivities: two samples, then for each parameter A with that parameter as in B (its key)."""
 
 
 @dataclass(frozen=True)
@@ -25,6 +28,7 @@ class Row:
     varied, sampled : its values by their keys
     group : number of its combination, from 0
     block : number of its scramble, from 0; of an independent sample that of the sample
+    part : of the points that sensitivities are taken from, see `A`; empty of all other runs
     """
 
     number: int
@@ -32,6 +36,7 @@ class Row:
     sampled: Mapping[str, Any]
     group: int
     block: int
+    part: str = ""
 
     @property
     def inputs(self) -> dict[str, Any]:
@@ -61,6 +66,36 @@ def rows(study: Study, first: int = 0, end: int = 1) -> list[Row]:
         found += [
             Row(n, group, sampled, g, block) for g, (n, group) in enumerate(zip(numbers, combinations, strict=True))
         ]
+    return found
+
+
+def sensitivity_rows(study: Study) -> list[Row]:
+    """Return the runs that sensitivities are taken from; none where they are not asked for."""
+    if study.sensitivity is None or study.sample is None:
+        return []
+    combinations, laws = groups(study), study.sample.distributions
+    number, found = study.sample.count * len(combinations), list[Row]()
+    for part, shares in saltelli(len(laws), study.sensitivity.count, study.sample.seed, list(laws)).items():
+        drawn = {key: law.values(shares[:, i]) for i, (key, law) in enumerate(laws.items())}
+        for j in range(len(shares)):
+            sampled = {key: _value(values[j], laws[key].unit) for key, values in drawn.items()}
+            for g, group in enumerate(combinations):
+                found.append(Row(number + len(found) + 1, group, sampled, g, j, part))
+    return found
+
+
+def saltelli(dimension: int, count: int, seed: int, names: Sequence[str]) -> dict[str, np.ndarray]:
+    """Return the points (count, d) in the unit cube from which the indices of Sobol' are taken, by their part.
+
+    Saltelli et al. 2010, Computer Physics Communications 181, 259-270: A and B are the halves of one Sobol sequence in 2 d
+    dimensions, scrambled; d more parts are A with a column of B.
+    """
+    generator = np.random.default_rng([seed, count])
+    drawn = qmc.Sobol(2 * dimension, seed=generator).random(count)  # type: ignore[call-arg]  # rng from SciPy 1.15 on
+    found = {A: drawn[:, :dimension], B: drawn[:, dimension:]}
+    for i, name in enumerate(names):
+        found[name] = found[A].copy()
+        found[name][:, i] = found[B][:, i]
     return found
 
 

@@ -5,9 +5,9 @@ from __future__ import annotations
 from collections.abc import Iterator, Mapping, Sequence
 from dataclasses import asdict, dataclass
 from functools import cached_property
-from typing import Any
+from typing import Any, Literal
 
-from orchestrator.landing.safety import UNITS
+from orchestrator.landing.safety import UNITS, is_exceeded
 from orchestrator.runs.job import Done
 from orchestrator.studies.sweep import probability
 from orchestrator.studies.sweep.design import Row, bare, groups
@@ -15,6 +15,9 @@ from orchestrator.studies.sweep.study import EXTREMES, Study
 
 ALL = "all"
 """Limits together."""
+Standing = Literal["unsafe", "unclear", "none", "safe"]
+"""``unclear``: a margin is smaller than its estimated error. ``none``: the run failed, or nothing was judged."""
+WORST_FIRST: Sequence[Standing] = ("unsafe", "unclear", "none", "safe")
 
 
 @dataclass(frozen=True)
@@ -33,6 +36,18 @@ class Outcome:
     def safe(self) -> bool | None:
         """Whether it is safe; None where that is not known: the run failed, or nothing was judged."""
         return None if self.done.failure is not None else self.done.summary.get("safe")
+
+    @property
+    def verdict(self) -> Standing:
+        """Whether it is safe, and why that is not known."""
+        if self.safe is None:
+            return "none"
+        return "safe" if self.safe else "unsafe" if is_exceeded(self.done.summary) else "unclear"
+
+    @cached_property
+    def is_recorded(self) -> bool:
+        """Whether its signals are there."""
+        return self.done.directory is not None and (self.done.directory / "results.csv").is_file()
 
     def keeps(self, limit: str) -> bool | None:
         """Return whether a limit is kept, or ``all``; None where that is not known."""
@@ -55,22 +70,31 @@ class Outcome:
 
 def cells(study: Study, outcome: Outcome) -> dict[str, Any]:
     """Return a row of the table; None where something is not known."""
-    summary, margins = outcome.done.summary, outcome.margins
+    summary = outcome.done.summary
     found: dict[str, Any] = {"run": outcome.row.number, **outcome.row.inputs}
     if study.sample is not None:
         found["scramble"] = outcome.row.block
+    if study.sensitivity is not None:
+        found["part"] = outcome.row.part
     found |= {
         "safe": outcome.safe,
-        "least_margin": margins.get(outcome.binding),
+        "least_margin": None,
         "binding": outcome.binding,
         "verdict": summary.get("safety", ""),
     }
+    found |= measured(study, outcome)
+    return found | {"failure": outcome.done.failure or "", "folder": outcome.done.job.key}
+
+
+def measured(study: Study, outcome: Outcome) -> dict[str, Any]:
+    """Return the columns of how a landing went, in numbers; None where one is not known."""
+    margins = outcome.margins
+    found: dict[str, Any] = {"least_margin": margins.get(outcome.binding)}
     for name in UNITS:
         judged = outcome.limits.get(name, {})
         found |= {f"margin.{name}": margins.get(name), f"worst.{name}": judged.get("worst")}
         found[f"error.{name}"] = judged.get("estimated_error")
-    found |= dict(_extremes(study, summary))
-    return found | {"failure": outcome.done.failure or "", "folder": outcome.done.job.key}
+    return found | dict(_extremes(study, outcome.done.summary))
 
 
 def _extremes(study: Study, summary: Mapping[str, Any]) -> Iterator[tuple[str, Any]]:
@@ -102,7 +126,9 @@ def chances(study: Study, outcomes: Sequence[Outcome], looks: int = 1) -> list[C
     """Return how probable it is that limits hold, for each combination of what varies; none without a sample."""
     if study.sample is None or not outcomes:
         return []
-    return [_chances(study, i, where, outcomes, looks) for i, where in enumerate(groups(study))]
+    sampled = [outcome for outcome in outcomes if not outcome.row.part]
+    there = {outcome.row.group for outcome in sampled}
+    return [_chances(study, i, where, sampled, looks) for i, where in enumerate(groups(study)) if i in there]
 
 
 def _chances(study: Study, group: int, where: Mapping[str, Any], every: Sequence[Outcome], looks: int) -> Chances:

@@ -11,7 +11,7 @@ import numpy as np
 
 from orchestrator.coupling.errors import InputError, nearest
 from orchestrator.studies.sweep.design import bare
-from orchestrator.studies.sweep.outcome import Outcome
+from orchestrator.studies.sweep.outcome import WORST_FIRST, Outcome, Standing
 from orchestrator.studies.sweep.study import Study
 
 
@@ -24,11 +24,13 @@ class Cell:
     margin : least of all limits, as a share of the limit; NaN where nothing is known
     safe : whether all runs are; None where one failed or was not judged, and none is known to be unsafe
     binding : the limit with the least margin
+    verdict : the worst of all runs
     """
 
     margin: float
     safe: bool | None
     binding: str
+    verdict: Standing
 
 
 def cell(outcomes: Sequence[Outcome]) -> Cell:
@@ -37,36 +39,41 @@ def cell(outcomes: Sequence[Outcome]) -> Cell:
     worst = min(known, key=lambda outcome: outcome.margins[outcome.binding], default=None)
     verdicts = [outcome.safe for outcome in outcomes]
     safe = False if False in verdicts else None if None in verdicts or not verdicts else True
+    verdict: Standing = min((outcome.verdict for outcome in outcomes), key=WORST_FIRST.index, default="none")
     if worst is None:
-        return Cell(np.nan, safe, "")
-    return Cell(worst.margins[worst.binding], safe, worst.binding)
+        return Cell(np.nan, safe, "", verdict)
+    return Cell(worst.margins[worst.binding], safe, worst.binding, verdict)
 
 
 def line(study: Study, outcomes: Sequence[Outcome], x: str) -> list[Cell]:
     """Return the worst at each value of `x`."""
-    return [cell([o for o in outcomes if o.row.varied[x] == value]) for value in values_of(study, x)]
+    return [cell([o for o in outcomes if o.row.varied[x] == value]) for value in values_of(study, x, outcomes)]
 
 
-def values_of(study: Study, key: str) -> list[Any]:
-    """Return the values of a key that varies; `InputError` where it does not."""
+def values_of(study: Study, key: str, outcomes: Sequence[Outcome] = ()) -> list[Any]:
+    """Return the values of a key that varies, with those of `outcomes` besides; `InputError` where it does not."""
     known = study.values
     if key not in known:
         there = ", ".join(known) or "nothing"
         raise InputError(f"{study.path}: {key} does not vary{nearest(key, known)}; there varies {there}")
-    return known[key]
+    more = (outcome.row.varied[key] for outcome in outcomes) if study.refine is not None else ()
+    return [*known[key], *{bare(v): v for v in more if v not in known[key]}.values()]
 
 
 def safe_ranges(study: Study, outcomes: Sequence[Outcome], x: str) -> str:
     """Return where it is safe along `x`, in words; between its values nothing is known."""
-    cells, numbers = line(study, outcomes, x), [bare(value) for value in values_of(study, x)]
-    unit = unit_of(study, x)
-    if not all(is_number(number) for number in numbers):
-        good = [str(number) for number, one in zip(numbers, cells, strict=True) if one.safe]
-        return f"{x}: safe with {', '.join(good)}" if good else f"{x}: safe with none"
-    order = np.argsort(numbers)
-    safe, at = [cells[i].safe is True for i in order], [numbers[i] for i in order]
-    parts = [_words(at[first], at[last], unit) for first, last in stretches(safe)]
-    return f"{x}: safe {', '.join(parts)} ({len(at)} values)" if parts else f"{x}: safe nowhere ({len(at)} values)"
+    cells, numbers = line(study, outcomes, x), [bare(v) for v in values_of(study, x, outcomes)]
+    return f"{x}: safe {stretches_in_words(numbers, [one.safe is True for one in cells], unit_of(study, x))}"
+
+
+def stretches_in_words(values: Sequence[Any], good: Sequence[bool], unit: str) -> str:
+    """Return where among `values` it is good: ``from 35 to 265 m (11 values)``, ``with fptlir``, ``nowhere``."""
+    if not all(is_number(value) for value in values):
+        return f"with {', '.join(str(v) for v, one in zip(values, good, strict=True) if one) or 'none'}"
+    order = np.argsort(values)
+    at = [values[i] for i in order]
+    parts = [_words(at[first], at[last], unit) for first, last in stretches([good[i] for i in order])]
+    return f"{', '.join(parts) or 'nowhere'} ({len(at)} values)"
 
 
 def all_ranges(study: Study, outcomes: Sequence[Outcome]) -> list[str]:

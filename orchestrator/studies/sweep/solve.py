@@ -4,6 +4,7 @@ from __future__ import annotations
 
 import time
 from collections.abc import Callable, Sequence
+from contextlib import suppress
 from dataclasses import dataclass, field
 from math import inf
 from pathlib import Path
@@ -14,9 +15,11 @@ from orchestrator.coupling.errors import InputError
 from orchestrator.runs.batch import Batches
 from orchestrator.runs.job import Done, Job
 from orchestrator.studies.sweep import probability
-from orchestrator.studies.sweep.design import Row, job, rows
+from orchestrator.studies.sweep.design import Row, job, rows, sensitivity_rows
 from orchestrator.studies.sweep.outcome import Chances, Outcome, chances
 from orchestrator.studies.sweep.ranges import all_ranges
+from orchestrator.studies.sweep.refine import more_rows
+from orchestrator.studies.sweep.sensitivity import Sensitivity, sensitivities
 from orchestrator.studies.sweep.study import FEWEST_SCRAMBLES, Study
 
 Told = Callable[[int, int, int], None]
@@ -46,6 +49,7 @@ class Swept:
     outcomes: list[Outcome] = field(default_factory=list)
     complete: bool = False
     stopped: bool = False
+    _sensitivities: tuple[int, list[Sensitivity]] = field(default_factory=lambda: (0, []), repr=False)
 
     @property
     def failed(self) -> list[Outcome]:
@@ -56,6 +60,13 @@ class Swept:
     def chances(self) -> list[Chances]:
         """How probable it is that limits hold."""
         return chances(self.study, self.outcomes, self.looks)
+
+    @property
+    def sensitivities(self) -> list[Sensitivity]:
+        """What margins and extremes hang on, as far as all runs are there that this is taken from."""
+        if self._sensitivities[0] != len(self.outcomes):
+            self._sensitivities = len(self.outcomes), sensitivities(self.study, self.outcomes)
+        return self._sensitivities[1]
 
     @property
     def counts(self) -> dict[str, int]:
@@ -73,24 +84,29 @@ def sweep(
     workers: int | None = None,
     timeout: float | None = None,
     told: Told = lambda done, of, failed: None,
+    dask: str | None = None,
 ) -> Swept:
     """Make the runs that `store` has not, and return all.
 
     Parameters
     ----------
     save : writes what is known so far; called every `SAVED_EVERY` seconds, and at the end, be it an interruption
-    workers, timeout : as for `run_batch`; timeout None: the study's
+    workers, timeout, dask : as for `Batches`; timeout None: the study's
     told : how far it is
     """
     ends = _looks(study)
     found = Swept(study, len(ends))
     first = 0
-    with read_once(), Batches(store, workers, timeout or study.timeout) as batches:
+    with read_once(), Batches(store, workers, timeout or study.timeout, dask) as batches:
         for end in ends:
             _Look(found, rows(study, first, end), save, told).made(batches)
             first, found.stopped = end, end < ends[-1]
             if _knows_enough(found):
                 break
+        if asked := sensitivity_rows(study):
+            _Look(found, asked, save, told).made(batches)
+        while added := more_rows(study, found.outcomes):
+            _Look(found, added, save, told).made(batches)
     found.complete = True
     save(found)
     return found
@@ -130,7 +146,8 @@ class _Look:
             raise self._in_words(error) from None
         except BaseException:
             self._gather()
-            self.save(self.found)
+            with suppress(OSError):  # of a full disk the table that is there stays
+                self.save(self.found)
             raise
         self.done |= {one.job.key: one for one in ended}
         self._gather()
@@ -180,6 +197,7 @@ def describe(found: Swept) -> dict[str, Any]:
         "counts": found.counts,
         "failures": [{"run": o.row.number, "reason": o.done.failure} for o in found.failed],
         "probability": [one.content() for one in found.chances],
+        "sensitivity": [one.content() for one in found.sensitivities],
         "safe_ranges": all_ranges(study, found.outcomes) if found.complete else [],
         "content": study.model_dump(by_alias=True, exclude_none=True),
     }

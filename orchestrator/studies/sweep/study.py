@@ -25,7 +25,7 @@ from typing import Annotated, Any, Literal, Self
 import numpy as np
 from pydantic import Field, ValidationError, model_validator
 
-from orchestrator.catalogue.documents import is_whole, read
+from orchestrator.catalogue.documents import is_quantity, is_whole, read
 from orchestrator.catalogue.quantities import complaints
 from orchestrator.coupling.errors import InputError, nearest
 from orchestrator.coupling.run.results import plain
@@ -39,8 +39,11 @@ Settings = dict[str, Any]
 FEWEST_SCRAMBLES = 10
 """Of which a t interval is taken."""
 EXTREMES = ("robot.roll", "robot.pitch", "robot.yaw", "robot.body.position.z", "cable.tension_mid")
-OWN_KEYS = ("method", "count", "seed", "scrambles", "stop_when")
-"""Of ``[sample]`` that are no parameters."""
+OWN_KEYS = {
+    "sample": (("method", "count", "seed", "scrambles", "stop_when"), "distributions"),
+    "refine": (("outline",), "widths"),
+}
+"""Table → its keys that are no parameters, and by which name those go that are."""
 
 
 class Range(Section):
@@ -89,6 +92,19 @@ class Stop(Section):
         return self
 
 
+class Refine(Section):
+    """Where runs are added: between those that differ, until they are as near to each other as wanted.
+
+    Attributes
+    ----------
+    widths : key that varies → how near, in the unit of its values
+    outline : what differs: the verdict alone, or the verdict or the limit that binds
+    """
+
+    outline: Literal["verdict", "limit"] = "limit"
+    widths: Annotated[dict[str, Positive], Field(min_length=1, max_length=2)]
+
+
 class Sample(Section):
     """What is drawn at random, and how.
 
@@ -127,6 +143,19 @@ class Sample(Section):
         return self
 
 
+class Sensitivity(Section):
+    """How many points the indices of Sobol' are estimated from; each takes two runs, and one for each parameter."""
+
+    count: Annotated[int, Field(ge=8)]
+
+    @model_validator(mode="after")
+    def _balanced(self) -> Self:
+        if self.count & (self.count - 1):
+            low = 2 ** (self.count.bit_length() - 1)
+            raise ValueError(f"count = {self.count} is not a power of two; take {low} or {2 * low}")
+        return self
+
+
 class Study(StudyFile):
     """A sweep, as it is read.
 
@@ -135,6 +164,8 @@ class Study(StudyFile):
     set : values for all runs, by their keys
     vary : of these, every combination is run; the keys ``scenario`` and ``robot`` are names of the catalogue, or paths
     sample : None: nothing is drawn at random
+    sensitivity : None: it is not asked for
+    refine : None: what varies has the values that it is given, and no others
     interval, tolerance, estimate : of the monolithic solver, see `Job`
     extremes : signals whose least and largest value are columns of the table; None: those of `EXTREMES` that there are
     record : runs whose signals are kept: none, all, or their numbers
@@ -147,6 +178,8 @@ class Study(StudyFile):
     set: Settings = Field(default_factory=dict)
     vary: dict[str, Varied] = Field(default_factory=dict)
     sample: Sample | None = None
+    sensitivity: Sensitivity | None = None
+    refine: Refine | None = None
     interval: Positive = 0.02
     tolerance: Positive = 1e-5
     estimate: bool = True
@@ -179,7 +212,26 @@ class Study(StudyFile):
                     raise ValueError(f"{both[0]} stands in [{other}] and in [{name}]; leave one of them out")
         if named := sorted({"robot", "scenario"} & {*self.set, *sampled}):
             raise ValueError(f"{named[0]} can stand in [vary] alone; a list of one value will do")
+        if self.sensitivity is not None and self.sample is None:
+            raise ValueError("has [sensitivity] without [sample]; say there how its parameters are distributed")
+        self._can_be_refined()
         return self
+
+    def _can_be_refined(self) -> None:
+        if self.refine is None:
+            return
+        if self.sample is not None:
+            raise ValueError(
+                "has [refine] and [sample]; an outline is refined where nothing is drawn: take two studies"
+            )
+        for key in self.refine.widths:
+            if key not in self.vary:
+                raise ValueError(f"refine: {key} does not vary{nearest(key, self.vary)}; give its values in [vary]")
+            numbers = [v["value"] if is_quantity(v) else v for v in self.values[key]]
+            if len(numbers) < 2 or any(isinstance(v, bool) or not isinstance(v, int | float) for v in numbers):
+                raise ValueError(f"refine: {key} needs two numbers at least in [vary], to add others between them")
+            if len({str(v.get("unit", "")) if is_quantity(v) else "" for v in self.values[key]}) > 1:
+                raise ValueError(f"refine: {key} has values in several units; give them in one")
 
 
 # -- reading ----------------------------------------------------------------------------------------------------
@@ -207,10 +259,17 @@ def study_of(document: Mapping[str, Any], path: Path) -> Study:
     try:
         study = Study.model_validate(_flattened(document))
     except ValidationError as error:
-        problems = (str(one).replace("sample.distributions", "sample") for one in complaints(error, Study))
+        problems = (_in_the_file(str(one)) for one in complaints(error, Study))
         raise InputError(f"{path}: {_readable(problem)}" for problem in problems) from None
     study._path = path
     return study
+
+
+def _in_the_file(problem: str) -> str:
+    """Return what is wrong with the keys as they stand in the file."""
+    for name, (_, rest) in OWN_KEYS.items():
+        problem = problem.replace(f"{name}.{rest}", name)
+    return problem
 
 
 def _readable(problem: str) -> str:
@@ -224,11 +283,12 @@ def _flattened(document: Mapping[str, Any]) -> dict[str, Any]:
     for name in ("set", "vary"):
         if isinstance(found.get(name), Mapping):
             found[name] = dict(_leaves(found[name]))
-    sample = found.get("sample")
-    if isinstance(sample, Mapping):
-        own = {key: value for key, value in sample.items() if key in OWN_KEYS}
-        drawn = {key: value for key, value in sample.items() if key not in OWN_KEYS}
-        found["sample"] = {**own, "distributions": dict(_leaves(drawn))}
+    for name, (own_keys, rest) in OWN_KEYS.items():
+        table = found.get(name)
+        if isinstance(table, Mapping):
+            own = {key: value for key, value in table.items() if key in own_keys}
+            parameters = {key: value for key, value in table.items() if key not in own_keys}
+            found[name] = {**own, rest: dict(_leaves(parameters))}
     return found
 
 

@@ -4,6 +4,7 @@ from __future__ import annotations
 
 import csv
 from collections.abc import Iterator, Mapping, Sequence
+from importlib.util import find_spec
 from pathlib import Path
 from typing import Any
 
@@ -12,11 +13,13 @@ import numpy as np
 from orchestrator.coupling.errors import InputError
 from orchestrator.coupling.run.results import read_json, replacing, write_json
 from orchestrator.runs.directory import circumstances
+from orchestrator.studies.sweep import atlas
 from orchestrator.studies.sweep.outcome import cells
+from orchestrator.studies.sweep.sensitivity import Index
 from orchestrator.studies.sweep.solve import Swept, describe
 from orchestrator.studies.sweep.study import Study
 
-STORE, TABLE, RESULT = "runs", "table.csv", "study.json"
+STORE, TABLE, PARQUET, MAP, RESULT = atlas.STORE, "table.csv", "table.parquet", "map.json", "study.json"
 ALWAYS = ("safe", "least_margin")
 """Columns that are there even where nothing is judged."""
 Columns = dict[str, np.ndarray]
@@ -48,9 +51,11 @@ def _require_same(folder: Path, study: Study) -> None:
 
 
 def save(folder: Path, found: Swept) -> None:
-    """Write the table, then ``study.json``: what is complete has both."""
+    """Write table and maps, then ``study.json``: what is complete has all."""
     rows = [cells(found.study, outcome) for outcome in found.outcomes]
     write_rows(folder / TABLE, rows)
+    write_parquet(folder / PARQUET, folder / TABLE)
+    write_json(folder / MAP, atlas.content(found))
     write_json(folder / RESULT, {**describe(found), **circumstances()})
 
 
@@ -93,6 +98,23 @@ def _column(texts: list[str]) -> np.ndarray:
     return np.array(texts, dtype=object) if not any(texts) else numbers
 
 
+def write_parquet(path: Path, table: Path) -> None:
+    """Write the columns of `table` as Parquet, where pyarrow is there: numbers as such, null where nothing is known."""
+    if find_spec("pyarrow") is None:
+        return
+    import pyarrow
+    from pyarrow import parquet
+
+    columns = {
+        name: pyarrow.array(values, from_pandas=True)
+        if values.dtype == float
+        else pyarrow.array(values.tolist(), "string")
+        for name, values in read_columns(table).items()
+    }
+    with replacing(path) as temporary:
+        parquet.write_table(pyarrow.table(columns), temporary)
+
+
 # -- words ------------------------------------------------------------------------------------------------------
 
 
@@ -117,3 +139,20 @@ def chance_rows(found: Swept) -> Iterator[tuple[str, ...]]:
             estimate = least if least == most else f"{least} to {most}"
             interval = f"{p.interval[0]:.4f} to {p.interval[1]:.4f}"
             yield where, name, str(p.count), estimate, interval, str(p.unknown or "")
+
+
+INDICES = ("where", "margin", "parameter", "first", "95 % interval", "total", "95 % interval")
+
+
+def index_rows(found: Swept) -> Iterator[tuple[str, ...]]:
+    """Yield a row for each parameter that a margin hangs on, under `INDICES`."""
+    for one in found.sensitivities:
+        where = ", ".join(f"{key} {value}" for key, value in one.where.items())
+        for name in (name for name in one.of if "margin" in name):
+            for parameter, both in one.of[name].items():
+                texts = (t for index in (both.first, both.total) for t in _index(index))
+                yield where, name.removeprefix("margin."), parameter, *texts
+
+
+def _index(index: Index) -> tuple[str, str]:
+    return f"{index.estimate:.3f}", f"{index.interval[0]:.3f} to {index.interval[1]:.3f}"
