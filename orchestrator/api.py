@@ -27,10 +27,10 @@ from orchestrator.runs.coupled import run_coupled
 from orchestrator.runs.directory import RunDirectory, claimed
 from orchestrator.runs.estimate import estimate_error
 from orchestrator.runs.files import (
-    Draw,
+    NO_VIEWS,
+    Views,
     load_comparison,
     load_run,
-    no_pictures,
     write_comparison,
     write_run,
     write_unfinished,
@@ -38,6 +38,7 @@ from orchestrator.runs.files import (
 from orchestrator.runs.result import Run, Signal, run_label
 from orchestrator.runs.summary import result
 from orchestrator.runs.systems import System, resolve
+from orchestrator.runs.whatif import leave
 from orchestrator.scenario.layers import shared_options
 from orchestrator.scenario.read import load
 from orchestrator.scenario.settings import Set, texts
@@ -101,7 +102,7 @@ def run(
     out : directory to write the results to, which must not exist; True: ``runs/SCENARIO-NNN``; None: nothing is written
     estimate : by which second run the error is estimated: ``finer``, ``coarser`` or ``none``
     progress : told how far the run is
-    pictures : whether pictures are drawn into the directory
+    pictures : whether pictures are drawn into the directory, and its page is made
 
     Returns
     -------
@@ -117,8 +118,12 @@ def run(
     with read_once():
         loaded = Changes(set, robot, master, macro_step, stop, timeout, estimate).of(scenario)
         with _directory(out, loaded.name) as directory:
-            found = _run(_ready(loaded), progress or _silent)
-            return found if directory is None else write_run(directory, found, _draw(pictures))
+            system = _ready(loaded)
+            found = _run(system, progress or _silent)
+            if directory is None:
+                return found
+            leave(directory, system, others=pictures)
+            return write_run(directory, found, _views(pictures))
 
 
 def compare(
@@ -159,8 +164,13 @@ def compare(
         first = changes.of(scenario)
         variants = _variants(scenario, first, changes, masters, macro_steps)
         with _directory(out, f"{first.name}-compare") as directory:
-            found = _compared(_ready(first), variants, progress or _silent, directory)
-            return found if directory is None else write_comparison(directory, found, _draw(pictures))
+            views = _views(pictures)
+            system = _ready(first)
+            found = _compared(system, variants, progress or _silent, directory, views)
+            if directory is None:
+                return found
+            leave(directory, system, others=pictures)
+            return write_comparison(directory, found, views)
 
 
 def sweep(
@@ -270,7 +280,7 @@ def _variants(
 
 
 def _compared(
-    system: System, variants: Sequence[Scenario], progress: Progress, directory: RunDirectory | None
+    system: System, variants: Sequence[Scenario], progress: Progress, directory: RunDirectory | None, views: Views
 ) -> Comparison:
     from orchestrator.runs.reference import solve_reference  # with the kernels of the monolithic solver
 
@@ -283,7 +293,7 @@ def _compared(
         COMPILATION.conclude()
     except RunError as error:
         if runs and directory is not None:
-            write_unfinished(directory, runs, str(error))
+            write_unfinished(directory, runs, str(error), views)
             raise Unfinished(error, runs, directory.path) from None
         raise
     return compared(runs, reference)
@@ -317,9 +327,9 @@ def _directory(out: Out, name: str) -> Iterator[RunDirectory | None]:
         yield directory
 
 
-def _draw(pictures: bool) -> Draw:
+def _views(pictures: bool) -> Views:
     if not pictures:
-        return no_pictures
-    from orchestrator.report.page import draw
+        return NO_VIEWS
+    from orchestrator.report import drawing, page
 
-    return draw
+    return Views(drawing.draw, page.write)

@@ -3,6 +3,7 @@
 from __future__ import annotations
 
 import os
+from pathlib import Path
 
 import llvmlite.binding as llvm
 import numba
@@ -12,6 +13,7 @@ from hypothesis import settings
 from threadpoolctl import threadpool_info
 
 from fmus.kernels import notice
+from tests.browser import wanting
 
 settings.register_profile("repeatable", deadline=None, derandomize=True)
 settings.register_profile("searching", deadline=None)
@@ -41,3 +43,16 @@ def pytest_report_header() -> str:
 def heard(monkeypatch: pytest.MonkeyPatch) -> None:
     """Let every test hear notices, whatever ``--quiet`` one before it has said."""
     monkeypatch.setattr(notice, "muted", False)
+
+
+@pytest.fixture(scope="session")
+def module() -> Path:
+    """The compiled solver of the page, built where it is not yet; a minute. Skips where there is no linker."""
+    from orchestrator.landing.monolithic import wasm  # with kernels that most tests do not need
+    from tests.what_if import DIST
+
+    try:
+        wasm.build(DIST)
+    except wasm.NoLinker as error:
+        wanting(str(error))
+    return DIST / wasm.MODULE

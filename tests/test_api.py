@@ -207,6 +207,26 @@ def test_a_picture_that_fails_loses_no_run(tmp_path: Path, monkeypatch):
     assert orchestrator.load_run(tmp_path / "out").manifest["complete"] is True
 
 
+def test_a_page_that_fails_loses_no_run(tmp_path: Path, monkeypatch):
+    def fail(*_, **__):
+        raise ValueError("no paper")
+
+    monkeypatch.setattr("orchestrator.report.page.write", fail)
+    run = orchestrator.run(OSCILLATOR, **SHORT, out=tmp_path / "out")
+    assert run.verdict == "within" and run.warnings == ["no page: ValueError: no paper"]
+    read = orchestrator.load_run(tmp_path / "out")
+    assert read.manifest["page"] == "ValueError: no paper" and read.manifest["pictures"] is None
+
+
+def test_a_run_leaves_its_page(tmp_path: Path):
+    run = orchestrator.run(OSCILLATOR, **SHORT, out=tmp_path / "with")
+    page = (tmp_path / "with" / "report.html").read_text(encoding="utf-8")
+    assert run.manifest["page"] is None and run.summary["title"] in page
+    assert orchestrator.load_run(tmp_path / "with").manifest["written"] in page, "it shows what the manifest says"
+    orchestrator.run(OSCILLATOR, **SHORT, out=tmp_path / "without", pictures=False)
+    assert not (tmp_path / "without" / "report.html").exists()
+
+
 def test_the_manifest_is_written_last(tmp_path: Path):
     out = tmp_path / "out"
     orchestrator.run(OSCILLATOR, **SHORT, out=out)

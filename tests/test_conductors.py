@@ -35,7 +35,7 @@ def problem(*arguments: object, **options: object) -> str:
     return "\n".join(caught.value.problems)
 
 
-@pytest.mark.parametrize("name", names())
+@pytest.mark.parametrize("name", WIRES)
 def test_sets_follow_from_modulus_diameter_and_wires(name: str):
     """physical: a solid rod; table1: the diameter for the radius; metallic: E times the area of the wires, and of EI
     half of what they have when all stick (parallel axes; rings at one and two wires' diameters). Rounded to 3 digits."""
@@ -180,7 +180,10 @@ def test_conductors_are_listed():
     assert listed.exit_code == 0
     for name in names():
         line = next(line for line in listed.output.splitlines() if line.split()[:1] == [name])
-        assert "(table1, physical, metallic)" in line
+        spec = load_conductor(name)
+        assert line.endswith(f"({', '.join(spec.sets)})")
+        for value, unit in ((1e3 * spec.diameter.value, "mm"), (1e-3 * spec.rated_strength.value, "kN")):
+            assert f" {value:.4g} {unit}" in line
 
 
 @pytest.mark.parametrize("value", ["3", "true", "[1]", "{}", '{ value = "x" }', '""'])

@@ -26,6 +26,7 @@ EXECUTED = [DOCS / "start.md", *sorted(page for page in (DOCS / "howto").glob("*
 BY_COMMAND = {
     DOCS / "verification.md",
     DOCS / "reproduction.md",
+    DOCS / "robots_on_lines.md",
     *DOCS.glob("reference/generated/*.md"),
     *DOCS.glob("_build/**/*.md"),
 }
@@ -143,3 +144,10 @@ def test_measured_numbers_are_those_of_the_file() -> None:
         text = page.read_text(encoding="utf-8")
         assert measured["BLOCK"].search(text), page
         assert measured["filled"](text, found) == text, f"{page}: python docs/measured.py --fill"
+
+
+def test_the_page_of_robots_on_lines_is_that_of_its_file() -> None:
+    made = runpy.run_path(str(DOCS / "robots_on_lines.py"))
+    found = json.loads(made["FILE"].read_text(encoding="utf-8"))
+    assert made["page"](found) == made["PAGE"].read_text(encoding="utf-8"), "python docs/robots_on_lines.py --fill"
+    assert made["PICTURE"].exists()

@@ -15,47 +15,17 @@ from orchestrator.cli.printing import print_table
 from orchestrator.coupling.errors import InputError
 from orchestrator.coupling.run.compare import signal_errors
 from orchestrator.report import accuracy, plots, style
-from orchestrator.report.page import draw, legend, report
+from orchestrator.report.drawing import draw, legend
+from orchestrator.report.page import report
 from orchestrator.report.signals import extremes, flight, in_the_air, panels_for, shown, words
 from orchestrator.runs.compare import Comparison, Reference, RunErrors
 from orchestrator.runs.directory import RunDirectory
 from orchestrator.runs.files import write_comparison, write_run, write_unfinished
 from orchestrator.runs.result import Run
+from tests.made_up import TIME, S, Z, kinked_shape, landing, made_up
 
-TIME = np.linspace(0.0, 2.0, 201)
-S = np.linspace(0.0, 200.0, 41)
-Z = -0.4 * np.sin(2.0 * TIME) ** 2
-
-
-def landing(n_wheels: int = 1, shift: float = 0.0) -> dict[str, np.ndarray]:
-    """The signals of a landing that touches at 0.5 s and is in the air from 1.2 to 1.5 s, `shift` too high."""
-    closed = (TIME >= 0.5) & ~((TIME > 1.2) & (TIME < 1.5))
-    table = {"time": TIME, "robot.body.position.y": np.full(201, 20.0), "robot.body.position.z": 3.0 + Z + shift}
-    table |= {f"robot.{name}": k * 0.01 * np.sin(TIME) for k, name in enumerate(("roll", "pitch", "yaw"))}
-    for k in range(1, n_wheels + 1):
-        table |= {f"contact{k}.normal_force": np.where(closed, 400.0 + k, 0.0), f"contact{k}.status": 1.0 * closed}
-    return table | {"cable.tension_mid": 22000.0 + 1000.0 * np.sin(TIME)}
-
-
-def kinked_shape() -> dict[str, np.ndarray]:
-    """A cable that hangs in a parabola and is pulled down under a wheel at 20 m."""
-    hanging = -2.0 * (1.0 - (S / 100.0 - 1.0) ** 2)
-    kink = np.minimum(S / 20.0, (200.0 - S) / 180.0)
-    position = np.stack([np.stack([0.0 * S, S, hanging + z * kink], axis=-1) for z in Z])
-    return {"time": TIME, "arc_length": S, "position": position, "tension": np.full((201, 41), 22000.0)}
-
-
-def made_up(table: dict[str, np.ndarray], master: str = "iqn_ils", macro_step: float = 0.01, **summary: object) -> Run:
-    """A run with these signals."""
-    n = len(table["time"]) - 1
-    steps = {"time": table["time"][1:], "iterations": 2 + np.arange(n) % 3, "converged": np.arange(n) != 7}
-    content = {
-        "scenario": "made_up", "master": master, "macro_step": macro_step, "units": {}, "tolerances": {}, "steps": n,
-        "estimated_error": {}, "unconverged_steps": 1, "left_the_groove": [], "verdict": "within",
-        "iterations_per_step": 3.0, "wall_s": 1.0 + macro_step, "solves": {"cable": int(1 / macro_step)},
-    }  # fmt: skip
-    manifest = {"complete": True, "error": None, "resolved": {"title": "Made up <here>"}}
-    return Run(table, steps, {}, content | summary, manifest)
+NOT_BUILT = Path(__file__).parent / "nothing"
+"""Where no interactive page was built: the pictures stand in the page."""
 
 
 def held_together(masters: list[str], macro_steps: list[float]) -> Comparison:
@@ -323,7 +293,7 @@ def test_a_run_is_drawn_from_its_directory(tmp_path: Path):
     pictures = draw(folder)
     assert [path.name for path in pictures] == ["overview.png", "iterations.png", "shapes.png"]
     assert all(path.is_file() and path.parent == folder / "plots" for path in pictures)
-    page = report(folder).read_text(encoding="utf-8")
+    page = report(folder, NOT_BUILT).read_text(encoding="utf-8")
     assert "Made up &lt;here&gt;" in page and page.count("<img") == 3 and "contact2.normal_force" in page
 
 
@@ -332,14 +302,14 @@ def test_a_comparison_is_drawn_with_its_runs(tmp_path: Path):
     write_comparison(RunDirectory(tmp_path / "all"), comparison)
     folders = {path.parent.relative_to(tmp_path / "all").as_posix() for path in draw(tmp_path / "all")}
     assert folders == {"plots", *(f"{run.label}/plots" for run in comparison.results)}
-    page = report(tmp_path / "all").read_text(encoding="utf-8")
-    assert page.count("<img") == 4 * 2 + 5 and "iqn_ils_0.01s/plots/overview.png" in page
+    page = report(tmp_path / "all", NOT_BUILT).read_text(encoding="utf-8")
+    assert page.count("<img") == 4 * 2 + 5 and "iqn_ils_0.01s/plots/overview" in page
 
 
 def test_runs_of_a_comparison_that_was_not_finished_are_drawn(tmp_path: Path):
     write_unfinished(RunDirectory(tmp_path / "all"), [made_up(landing(), name) for name in ("a", "b")], "no reference")
     assert {path.parent.parent.name for path in draw(tmp_path / "all")} == {"a_0.01s", "b_0.01s"}
-    assert "no reference" in report(tmp_path / "all").read_text(encoding="utf-8")
+    assert "no reference" in report(tmp_path / "all", NOT_BUILT).read_text(encoding="utf-8")
 
 
 def test_a_run_of_one_point_has_a_page_without_pictures(tmp_path: Path):

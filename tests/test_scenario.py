@@ -104,7 +104,10 @@ def test_another_robot_and_another_master(file: Path):
         ("robot.parametres.mass=12", "robot.parametres: unknown key; did you mean parameters?"),
         ("simulation.stoptime=1.0", "simulation.stoptime: unknown key; did you mean stop_time?"),
         ("cabel.fmu=a.fmu", "cabel: unknown key; did you mean cable?"),
-        ("cable.model=x", "cable.model: unknown key; known here: fmu, conductor, stiffness_set, steps, parameters"),
+        (
+            "cable.model=x",
+            "cable.model: unknown key; known here: fmu, conductor, stiffness_set, steps, state, parameters",
+        ),
         ("cable.parameters.span=true", "cable.parameters.span: True is not of type real"),
         ("cable.parameters.n_elements=2.5", "cable.parameters.n_elements: 2.5 is not of type integer"),
         ("cable.parameters.span=[1, 2]", "must be a number, true, false or a string"),
@@ -244,7 +247,9 @@ def test_shipped_scenarios_say_what_they_always_said(path: Path):
 
 
 def judged_by(name: str) -> dict[str, float | bool]:
-    """Return the limits of a shipped scenario, which it has beside what it always said."""
+    """Return the limits of a scenario of the paper, which it has beside what it always said."""
+    if name.startswith(("line_", "crossing_")):
+        return {}
     if name.startswith("rig"):
         return {"limits.z": False, "limits.rated_strength": 78110.0}
     line = {"limits.conductor_spacing": 3.45, "limits.safe_clearance": 1.0, "limits.rated_strength": 98370.0}

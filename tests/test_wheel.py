@@ -3,6 +3,7 @@
 The kernels are compiled anew, twice: `make test-wheel`, minutes.
 """
 
+import json
 import os
 import shutil
 import subprocess
@@ -76,6 +77,12 @@ def test_what_is_in_the_wheel(wheel, installed):
     robots = (ROOT / "orchestrator" / "catalogue" / "robots").glob("*.toml")
     assert {f"orchestrator/catalogue/robots/{path.name}" for path in robots} <= names
     assert {"fmus/py.typed", "orchestrator/py.typed", "fmus/cable/README.md"} <= names
+    web = {name.partition("report/web/")[2] for name in names if "report/web/" in name}
+    built = ROOT / "orchestrator" / "report" / "web" / "dist"
+    if (built / "build.json").is_file():
+        files = {*json.loads((built / "build.json").read_text(encoding="utf-8"))["files"], "build.json"}
+        assert {f"dist/{name}" for name in files} <= web, "what `make page` has built"
+    assert all(name.startswith("dist/") for name in web), "sources and packages stay out"
     assert any(name.endswith("dist-info/licenses/LICENSE") for name in names)
     assert {name.partition("/")[0] for name in names if ".dist-info" not in name} - {"File"} == {"fmus", "orchestrator"}
 

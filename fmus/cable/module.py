@@ -7,12 +7,12 @@ from functools import lru_cache
 import numpy as np
 
 from fmus.cable import dynamics, ports
-from fmus.cable.assembly import Model, interpolate
+from fmus.cable.assembly import Model
 from fmus.cable.diagnosis import diagnose
 from fmus.cable.mesh import MOST, TOLERANCE, Line, automatic, nodes, spread
 from fmus.cable.state import N_PORTS, NOT_FINITE, OFF_CABLE, OK, factorise_mass, make_work, state_size
 from fmus.cable.statics import catenary, equilibrium, mesh_model
-from fmus.kernels.roots import root
+from fmus.cable.stringing import Stringing
 from fmus.kernels.time_integration import collocation, generalized_alpha
 from fmus.module.variables import (
     NON_NEGATIVE,
@@ -294,28 +294,11 @@ class Cable:
         besides = self["grading_position"]
         return np.append(np.interp(wanted[wanted >= 0.0], y, model.s), [besides] if besides >= 0.0 else [])
 
-    def _length_for_sag(self) -> float:
-        """Return the unstretched length with which the equilibrium has the sag wanted."""
-
+    def stringing(self) -> Stringing:
+        """Return the line whatever its length; the shares of its mesh are those of a line as long as its chord."""
         chord = float(np.hypot(self["span"], self["level_difference"]))
         shares = self._nodes(chord) / chord  # held: what jumps by an element has no root
-
-        def excess(length: float) -> float:
-            model = self._model(shares * length)
-            q = equilibrium(model, self["span"], self["level_difference"])
-            point = np.zeros(6)
-            interpolate(model, q, length / 2, np.zeros(8), point)
-            return 0.5 * self["level_difference"] - point[2] - self["sag"]
-
-        parabola = chord * (1.0 + 4.0 * (self["sag"] / chord) ** 2) + self["sag"] * 0.01
-        longest = min(parabola, chord + 2.1 * self["sag"])
-        try:
-            return root(excess, 0.99 * chord, longest, xtol=1e-12 * chord)
-        except ValueError:
-            raise ModuleError(
-                f"cable: sag: {self['sag']:g} m cannot be reached; "
-                "check it against span, axial_stiffness and linear_density"
-            ) from None
+        return Stringing(lambda length: self._model(shares * length), self["span"], self["level_difference"])
 
     def step(self, t: float, h: float) -> None:
         """Advance from `t` by the macro step `h`; raises `ModuleError` where Newton's method fails."""
@@ -380,7 +363,11 @@ class Cable:
 
     def _show_nodes(self) -> None:
         """Write position and slope of the nodes that are shown."""
-        self._nodes_shown[:] = self.state[: self.model.weight.size].reshape(-1, 6)[self._nodes_at]
+        self._nodes_shown[:] = self.nodes_at(self.state)
+
+    def nodes_at(self, state: np.ndarray) -> np.ndarray:
+        """Return position and slope of the nodes that are shown, (N_NODES, 6), in a `state` of the kernels."""
+        return state[: self.model.weight.size].reshape(-1, 6)[self._nodes_at]
 
 
 @lru_cache(maxsize=REMEMBERED)
@@ -388,5 +375,5 @@ def _equilibrium_of(parameters: bytes) -> tuple[float, Model, np.ndarray]:
     """Return unstretched length, cable and equilibrium (n,) with these parameters, in the order of the table."""
     cable = Cable()
     cable.values[cable.table.indices(cable.table.names("parameter"))] = np.frombuffer(parameters)
-    length = cable._length_for_sag() if cable["sag"] > 0.0 else cable["unstretched_length"]
+    length = cable.stringing().length_for_sag(cable["sag"]) if cable["sag"] > 0.0 else cable["unstretched_length"]
     return length, *cable._rest(length)

@@ -3,6 +3,7 @@
 from __future__ import annotations
 
 import math
+from functools import cache
 
 import numpy as np
 
@@ -114,6 +115,7 @@ def _body_outputs() -> list[Variable]:
     ]
 
 
+@cache
 def robot_table(n_wheels: int) -> VariableTable:
     """Return the variable table of a robot with `n_wheels` wheels: parameters, inputs, outputs."""
     if not 1 <= n_wheels <= rigid_body.MAX_WHEELS:

@@ -21,6 +21,11 @@ def is_quantity(value: Any) -> bool:
     return isinstance(value, dict) and "value" in value
 
 
+def bare(value: Any) -> Any:
+    """Return the value of a quantity, or what is none as it is."""
+    return value["value"] if is_quantity(value) else value
+
+
 def is_over_time(value: Any) -> bool:
     """Whether `value` is a table that stands for an input over time: of times, or of a file."""
     return isinstance(value, dict) and (isinstance(value.get("time"), list) or isinstance(value.get("file"), str))

@@ -22,13 +22,15 @@ def robots() -> dict[str, str]:
 
 
 def conductors() -> dict[str, str]:
-    """Return titles and sets of stiffnesses of the conductors by name; what is wrong with a faulty one in their place."""
+    """Return a line for each conductor by name: title, diameter, mass, rated strength, sets; of a faulty one what is wrong."""
     return {name: _or_fault(lambda name=name: _conductor(name)) for name in conductor_spec.names()}
 
 
 def _conductor(name: str) -> str:
     spec = conductor_spec.load_conductor(name)
-    return f"{spec.title} ({', '.join(spec.stiffness_sets)})"
+    numbers = [f"{1e3 * spec.diameter.value:.4g} mm", f"{spec.linear_density.value:.4g} kg/m"]
+    numbers += [f"{1e-3 * spec.rated_strength.value:.4g} kN"] if spec.rated_strength is not None else []
+    return f"{spec.title}; {', '.join(numbers)} ({', '.join(spec.sets)})"
 
 
 def contact_sets() -> dict[str, str]:

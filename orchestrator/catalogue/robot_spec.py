@@ -3,6 +3,7 @@
 from __future__ import annotations
 
 import re
+from collections.abc import Iterator
 from pathlib import Path
 from typing import Annotated, Any, Literal
 
@@ -190,24 +191,28 @@ class RobotSpec(Strict):
         """Return the contact's parameters that belong to the wheel (SI)."""
         return {name: getattr(self.contact, name).value for name in Groove.model_fields}
 
+    def quantities(self) -> dict[str, Quantity[Any]]:
+        """Return key → quantity of every number, with its unit, source and reason."""
+        return dict(_quantities("", self))
+
     def assumptions(self) -> dict[str, str]:
         """Return key → reason of everything assumed."""
-        return dict(_assumptions("", self))
+        return {key: one.reason or "" for key, one in self.quantities().items() if one.source == ASSUMED}
 
 
 def _components(name: str, vector: tuple[float, float, float]) -> dict[str, float]:
     return {f"{name}.{axis}": float(value) for axis, value in zip("xyz", vector, strict=True)}
 
 
-def _assumptions(place: str, part: Any) -> list[tuple[str, str]]:
+def _quantities(place: str, part: Any) -> Iterator[tuple[str, Quantity[Any]]]:
     if isinstance(part, Quantity):
-        return [(place, part.reason or "")] if part.source == ASSUMED else []
-    if isinstance(part, list):
-        return [found for k, item in enumerate(part, 1) for found in _assumptions(f"{place}[{k}]", item)]
-    if isinstance(part, BaseModel):
-        names = type(part).model_fields
-        return [found for name in names for found in _assumptions(f"{place}.{name}".lstrip("."), getattr(part, name))]
-    return []
+        yield place, part
+    elif isinstance(part, list):
+        for k, item in enumerate(part, 1):
+            yield from _quantities(f"{place}[{k}]", item)
+    elif isinstance(part, BaseModel):
+        for name in type(part).model_fields:
+            yield from _quantities(f"{place}.{name}".lstrip("."), getattr(part, name))
 
 
 def load_robot(name_or_path: str | Path) -> RobotSpec:

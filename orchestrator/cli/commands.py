@@ -114,8 +114,9 @@ def validate(scenario: options.Scenario, robot: options.Robot = None, set_: opti
     """
     with importing():
         from orchestrator.api import load_scenario
+        from orchestrator.landing.line_state import rest_words
         from orchestrator.runs.components import master_of, opened
-        from orchestrator.runs.systems import resolve
+        from orchestrator.runs.systems import LandingSystem, resolve
 
     loaded = load_scenario(scenario, set=set_, robot=robot)
     system = resolve(loaded)
@@ -124,6 +125,8 @@ def validate(scenario: options.Scenario, robot: options.Robot = None, set_: opti
         print(f"{scenario}: valid; {len(graph.components)} FMUs, {len(list(graph.connections))} connections")
         for note in system.notes(graph):
             print(note)
+    if isinstance(system, LandingSystem) and system.landing.rest is not None:
+        print(rest_words(system.landing.rest.content()))
 
 
 @app.command()

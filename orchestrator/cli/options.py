@@ -76,5 +76,5 @@ Set = Annotated[
 ]
 Quiet = Annotated[bool, typer.Option("--quiet", help="No progress.")]
 NoPictures = Annotated[
-    bool, typer.Option("--no-pictures", help="Draw no pictures; `orchestrator report` draws them later.")
+    bool, typer.Option("--no-pictures", help="No pictures and no page; `orchestrator report` makes them later.")
 ]

@@ -33,6 +33,7 @@ COLOURS = {
 
 def print_run(run: Run) -> None:
     """Print the extremes of the main signals, the cost, the estimated error and the drift of the energy."""
+    from orchestrator.landing.line_state import rest_words
     from orchestrator.report.signals import extremes, in_the_air
 
     summary = run.summary
@@ -40,6 +41,8 @@ def print_run(run: Run) -> None:
         complain(note)
     for name, count in summary.get("fmu_warnings", {}).items():
         complain(f"{name}: the FMU has warned {count} times; fmu.log has what it says")
+    if summary.get("line"):
+        print(rest_words(summary["line"]))
     rows = extremes(run.table, run.tolerances, summary["units"])
     print_table(("signal", "unit", "start", "min", "max", "end"), rows)
     print(

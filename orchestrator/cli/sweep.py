@@ -50,6 +50,10 @@ def sweep(
     drawn = maps.write(folder, read, found.outcomes), odds.write(folder, read, found.chances)
     for path in [*chain(*drawn), *bars.write(folder, found.sensitivities)]:
         print(f"picture in {path}")
+    if (missing := write.page(folder)) is not None:
+        printing.complain(missing)
+    else:
+        print(f"page in {folder / 'report.html'}")
     raise typer.Exit(MISSED if found.failed else DONE)
 
 

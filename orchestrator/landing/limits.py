@@ -16,9 +16,13 @@ from orchestrator.landing.workspace import Formula, NoRoom
 from orchestrator.scenario.types import LandingScenario, Provenance, Scenario
 
 SHARE_OF_STRENGTH = 0.4
-"""Of the rated tensile strength: 1 over the design factor of safety of 2.5 that is usual for conductors (GB 50545)."""
+"""Of the rated tensile strength: 1 over the design factor of safety of 2.5 at the lowest point (GB 50545-2010, clause 5.0.7).
+
+At the supports the clause lets 2.25 pass; judged is the largest tension anywhere, so that the lower share is on the safe side.
+"""
 BY_CODE = (
-    f"{SHARE_OF_STRENGTH} of the rated strength: a factor of safety of 2.5, as codes for overhead lines ask (GB 50545)"
+    f"{SHARE_OF_STRENGTH} of the rated strength: a factor of safety of 2.5 at the line's lowest point, "
+    "GB 50545-2010, clause 5.0.7 (at supports it asks for 2.25)"
 )
 NOT_GIVEN = "no limit given"
 
@@ -88,7 +92,7 @@ def _words(source: str, reason: str) -> str:
 def _roll(landing: Landing) -> tuple[Formula, str]:
     size = _size(_spec(landing))
     _require_hanging(landing, "roll")
-    arm = min(abs(height) for height in _line_heights(landing))
+    arm = min(abs(height) for height in line_heights(landing))
     return workspace.roll(arm, size.along.value), "L_c from the wheel's mount and groove, D_Ry of the robot's size"
 
 
@@ -108,6 +112,26 @@ def _pitch(landing: Landing) -> tuple[Formula, str]:
         raise NoRoom(f"robot {spec.name} does not say its largest thrust; give [rotors] max_thrust, or limits.pitch")
     mass, gravity = _robot_values(landing, "mass", "gravity")
     return workspace.pitch(mass, gravity, spec.rotors.max_thrust.value), "F_z,max of the robot's rotors"
+
+
+def pitch_by_mass(landing: Landing) -> dict[str, float] | None:
+    """Return what the limit of pitch follows from beside the mass: gravity (m/s²) and largest thrust (N).
+
+    None where it does not: it is given, or nothing gives it.
+    """
+    spec = landing.sources.spec
+    if (
+        landing.scenario.limits.pitch is not None
+        or spec is None
+        or spec.limits.pitch is not None
+        or spec.rotors is None
+    ):
+        return None
+    try:
+        _require_hanging(landing, "pitch")
+    except NoRoom:
+        return None
+    return {"gravity": _robot_values(landing, "gravity")[0], "thrust": spec.rotors.max_thrust.value}
 
 
 def _z(landing: Landing) -> tuple[Formula, str]:
@@ -138,14 +162,14 @@ def _size(spec: RobotSpec) -> Size:
 
 def _require_hanging(landing: Landing, name: str) -> None:
     """Raise `NoRoom` for a robot whose centre of mass is above the line: it topples from any angle, no angle is safe."""
-    above = _robot_values(landing, "center_of_mass.z")[0] - max(_line_heights(landing))
+    above = _robot_values(landing, "center_of_mass.z")[0] - max(line_heights(landing))
     if above > 0.0:
         raise NoRoom(
             f"its centre of mass is {above:.3g} m above the line: it topples from any angle; give limits.{name}"
         )
 
 
-def _line_heights(landing: Landing) -> list[float]:
+def line_heights(landing: Landing) -> list[float]:
     """Return how high (m) the line is over the rotor plane where it lies in the groove of each wheel; negative: below it."""
     mounts = _robot_values(landing, *(f"wheel[{k + 1}].mount.z" for k in range(landing.n_wheels)))
     distance = touching_distance(contact_module(landing.contact, 0.0))

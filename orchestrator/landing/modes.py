@@ -18,6 +18,7 @@ from fmus.cable.assembly import HALF_BANDWIDTH, Model, element_work, interpolate
 from fmus.cable.module import Cable
 from fmus.module.variables import ModuleError
 from orchestrator.coupling.errors import InputError
+from orchestrator.landing.line_state import parameters_now
 from orchestrator.scenario.types import GraphScenario, Scenario
 
 N_POINTS = 201
@@ -65,7 +66,8 @@ def of_scenario(scenario: Scenario, count: int) -> CableModes:
         raise InputError(f"{scenario.path}: cable.fmu: the modes of a foreign cable are not known; leave `fmu` out")
     cable = Cable()
     try:
-        cable.table.assign(cable.values, scenario.cable.parameters)
+        given = scenario.cable.parameters
+        cable.table.assign(cable.values, {**given, **parameters_now(scenario, given)})
         cable.initialize(0.0)
     except ModuleError as error:
         raise InputError(f"{scenario.path}: {error}") from None

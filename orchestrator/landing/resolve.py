@@ -22,6 +22,7 @@ from orchestrator.coupling.course import Course
 from orchestrator.coupling.errors import InputError
 from orchestrator.coupling.fmu.instance import Fmu
 from orchestrator.landing.contract import BREAKS, check_variables
+from orchestrator.landing.line_state import Rest, parameters_now, rest_of
 from orchestrator.landing.mesh import Mesh, mesh_of
 from orchestrator.landing.placement import Placement, place, wheels_along
 from orchestrator.scenario.over_time import courses, held
@@ -46,12 +47,14 @@ class Sources:
     variables : of cable, robot and contact, as a foreign FMU's model description or our table has them
     n_wheels : of the robot
     mounts : where a foreign robot has its wheels, if it says so by its outputs alone
+    line : parameters of the cable that follow from the state of the line
     """
 
     spec: RobotSpec | None
     variables: Mapping[str, Variables]
     n_wheels: int
     mounts: Mapping[str, Value] = field(default_factory=dict)
+    line: Mapping[str, Value] = field(default_factory=dict)
 
 
 @dataclass(frozen=True)
@@ -82,13 +85,14 @@ class Landing:
     ----------
     contact : of every wheel; the arc length under it is in `placement`
     placement : the start of the robot, and the arc length under each wheel
-    mesh : of our cable; None of a foreign one
+    mesh, rest : of our cable, the latter before the robot comes; None of a foreign one
     """
 
     scenario: LandingScenario
     sources: Sources
     placement: Placement
     mesh: Mesh | None
+    rest: Rest | None
     cable: Part
     robot: Part
     contact: Part
@@ -100,7 +104,7 @@ class Landing:
 
     def changed(self, scenario: LandingScenario) -> Landing:
         """Return the landing of a `scenario` that starts alike: with other steps or other options of the master."""
-        return _landing(scenario, self.sources, self.placement, self.mesh)
+        return _landing(scenario, self.sources, self.placement, self.mesh, self.rest)
 
     def meshed(self, scenario: LandingScenario) -> Landing:
         """Return the landing of a `scenario` in which the mesh alone is another."""
@@ -117,6 +121,7 @@ def resolve(scenario: LandingScenario) -> Landing:
     sources = _read(scenario)
     try:
         sources = replace(sources, mounts=_mounts(scenario, sources))
+        sources = replace(sources, line=parameters_now(scenario, _cable(scenario, sources).module))
         return _landing(scenario, sources, *_placed(scenario, sources))
     except ModuleError as error:
         raise InputError(f"{scenario.path}: {error}") from None
@@ -184,17 +189,20 @@ def _arm(fmu: Fmu, k: int, axis: str) -> float:
 # -- what follows from it -------------------------------------------------------------------------------------
 
 
-def _landing(scenario: LandingScenario, sources: Sources, placement: Placement, mesh: Mesh | None) -> Landing:
+def _landing(
+    scenario: LandingScenario, sources: Sources, placement: Placement, mesh: Mesh | None, rest: Rest | None
+) -> Landing:
     robot, known = _robot(scenario, sources), sources.variables["robot"]
     initial = {name: value for name, value in placement.initial.items() if name in known}
     settings = dict(scenario.robot.parameters) | initial | held(scenario.robot.inputs)
     robot = replace(robot, settings=settings, module=dict(robot.module) | placement.initial)
-    return Landing(scenario, sources, placement, mesh, _cable(scenario, sources), robot, _contact(scenario, sources))
+    cable, contact = _cable(scenario, sources), _contact(scenario, sources)
+    return Landing(scenario, sources, placement, mesh, rest, cable, robot, contact)
 
 
 def _cable(scenario: LandingScenario, sources: Sources) -> Part:
     section, shown = scenario.cable, _shown(scenario.cable.fmu, sources.variables["cable"], Cable.table)
-    settings = _mesh(scenario, sources) | section.parameters
+    settings = _mesh(scenario, sources) | section.parameters | dict(sources.line)
     return Part(_path(section.fmu), section.steps, settings, shown | settings)
 
 
@@ -246,8 +254,8 @@ def _shown(file: str | None, known: Variables, table: VariableTable) -> dict[str
     return {name: known[name].start for name in shared}
 
 
-def _placed(scenario: LandingScenario, sources: Sources) -> tuple[Placement, Mesh | None]:
-    """Return the start of the robot over the cable at rest, and the mesh of our cable."""
+def _placed(scenario: LandingScenario, sources: Sources) -> tuple[Placement, Mesh | None, Rest | None]:
+    """Return the start of the robot over the cable at rest, and the mesh of our cable, and what it is like at rest."""
     cable = cable_module(_cable(scenario, sources))
     robot = robot_module(_robot(scenario, sources), sources.n_wheels)
     contact = contact_module(_contact(scenario, sources), 0.0)
@@ -257,8 +265,10 @@ def _placed(scenario: LandingScenario, sources: Sources) -> tuple[Placement, Mes
     if scenario.robot.fmu is None:
         robot.table.assign(robot.values, placement.initial)
         robot.initialize(0.0)  # its mass and inertia are looked at before anything is run
+    if scenario.cable.fmu is not None:
+        return placement, None, None
     mesh = mesh_of(cable, _weight(robot), landing.position, placement.arc_lengths)
-    return placement, mesh if scenario.cable.fmu is None else None
+    return placement, mesh, rest_of(cable, scenario)
 
 
 # -- our modules ----------------------------------------------------------------------------------------------
@@ -266,9 +276,15 @@ def _placed(scenario: LandingScenario, sources: Sources) -> tuple[Placement, Mes
 
 def cable_module(part: Part) -> Cable:
     """Return our cable with the parameters of `part`, at rest."""
+    cable = cable_as_given(part)
+    cable.initialize(0.0)
+    return cable
+
+
+def cable_as_given(part: Part) -> Cable:
+    """Return our cable with the parameters of `part`; it is not initialised."""
     cable = Cable()
     _assign(cable.table, cable.values, part.module)
-    cable.initialize(0.0)
     return cable
 
 

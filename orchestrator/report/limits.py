@@ -12,13 +12,9 @@ from matplotlib.ticker import MaxNLocator
 
 from orchestrator.coupling.run.results import Table
 from orchestrator.landing.safety import Judged, Series, readable, series
+from orchestrator.report.signals import LABELS
 from orchestrator.report.style import BLACK, COLOURS, GREEN, LINES, VERMILION, legend_above, saved
 
-LABELS = {
-    "roll": "Roll against\nthe line", "yaw": "Yaw against\nthe line", "pitch": "Pitch", "z": "Sunk since\ntouching",
-    "slip": "Slid along\nthe line", "airborne": "Off the line\nagain", "tension": "Tension by\nrated strength",
-    "wheel_force": "Load on\na wheel",
-}  # fmt: skip
 SIGNS = {"deg": "°", "1": "–"}
 BOTH_WAYS = ("roll", "yaw", "pitch")
 """Limits that hold to both sides of zero; what the others limit is never safer for being large."""

@@ -26,6 +26,12 @@ MOST_PANELS, MOST_LINES = 6, 6
 """Panels of a general graph, and lines in one panel."""
 BETWEEN = re.compile(r"_(mean|rate)((?:\.[xyz])?)$")
 """End of the name of a mean or slope that belongs to another signal, and only serves the coupling."""
+LABELS = {
+    "roll": "Roll against\nthe line", "yaw": "Yaw against\nthe line", "pitch": "Pitch", "z": "Sunk since\ntouching",
+    "slip": "Slid along\nthe line", "airborne": "Off the line\nagain", "tension": "Tension by\nrated strength",
+    "wheel_force": "Load on\na wheel",
+}  # fmt: skip
+"""Limit → what is held against it, in two lines."""
 PEAK = "_max"
 """End of the name of a signal's largest value within the last macro step."""
 NO_UNITS: Mapping[str, str] = MappingProxyType({})

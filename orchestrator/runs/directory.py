@@ -20,6 +20,9 @@ from orchestrator.coupling.run.results import replacing, write_fields, write_jso
 
 PACKAGES = ("line-landing", "numpy", "scipy", "numba", "fmpy", "pythonfmu")
 
+START_BLOCKS, START = "start.bin", "start.json"
+"""What a landing leaves to be solved anew, and what is said of it (`orchestrator/runs/whatif.py`)."""
+
 
 class Taken(InputError):
     """The directory is there already."""
@@ -69,7 +72,7 @@ class RunDirectory:
 
     def write_manifest(self, content: Mapping[str, Any], error: str | None = None) -> None:
         """Write ``manifest.json``, the last file; with `error` the run is marked as incomplete."""
-        self.write_json("manifest.json", {"complete": error is None, "error": error, **content, **circumstances()})
+        self.write_json("manifest.json", manifest(content, error))
 
     def discard(self) -> None:
         """Remove the directory if nothing was written: its run did not come to be."""
@@ -100,6 +103,11 @@ def folder_for(path: Path, option: str) -> Path:
     except OSError as error:
         raise InputError(f"{option} {path}: cannot be made a folder ({error.strerror}); choose another") from None
     return path
+
+
+def manifest(content: Mapping[str, Any], error: str | None = None) -> dict[str, Any]:
+    """Return what a manifest says: whether all is there, or why not; what it was made from, and under which circumstances."""
+    return {"complete": error is None, "error": error, **content, **circumstances()}
 
 
 def circumstances() -> dict[str, Any]:

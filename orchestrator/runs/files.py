@@ -1,21 +1,21 @@
-"""Who writes a run directory, and who reads it: tables, fields, summary, pictures, and last the manifest.
+"""Who writes a run directory, and who reads it: tables, fields, summary, pictures, page, and last the manifest.
 
-The pictures are drawn by whoever calls, from the directory alone: a picture that fails is noted and loses no run.
+Pictures and page are made by whoever calls, from what stands there: one that fails is noted and loses no run.
 """
 
 from __future__ import annotations
 
 from collections.abc import Callable, Sequence
-from dataclasses import replace
+from dataclasses import dataclass, replace
 from pathlib import Path
 from typing import Any
 
 import numpy as np
 
 from orchestrator.coupling.errors import InputError
-from orchestrator.coupling.run.results import Table, read_fields, read_json, read_table
+from orchestrator.coupling.run.results import Table, plain, read_fields, read_json, read_table
 from orchestrator.runs.compare import Comparison
-from orchestrator.runs.directory import RunDirectory
+from orchestrator.runs.directory import RunDirectory, manifest
 from orchestrator.runs.result import Run
 
 FIELD_UNITS = {
@@ -25,24 +25,31 @@ FIELD_UNITS = {
 COUNTS = {"iterations": int, "subdivisions": int, "rejected": int, "columns": int, "converged": bool}
 """Columns of ``iterations.csv`` that are no real numbers."""
 FMU_LOG = "fmu.log"
-Draw = Callable[[Path], object]
-"""Draws the pictures of a run or a comparison into its directory."""
+Manifest = dict[str, Any]
 
 
-def no_pictures(_: Path) -> None:
-    """Draw nothing."""
+@dataclass(frozen=True)
+class Views:
+    """What people look at, made in a directory: the pictures, and the page, which shows what the manifest will say."""
+
+    pictures: Callable[[Path], object] = lambda directory: None
+    page: Callable[[Path, Manifest], object] = lambda directory, manifest: None
+
+
+NO_VIEWS = Views()
 
 
 # -- writing --------------------------------------------------------------------------------------------------
 
 
-def write_run(directory: RunDirectory, run: Run, draw: Draw = no_pictures) -> Run:
+def write_run(directory: RunDirectory, run: Run, views: Views = NO_VIEWS) -> Run:
     """Write all files of a run and return it as it stands there; one that ended early is marked as incomplete."""
     _write_tables(directory, run)
-    return _finish(directory, run, _drawn(directory, draw))
+    notes = _viewed(directory, run, run.error, views)
+    return _finish(directory, run, notes)
 
 
-def write_comparison(directory: RunDirectory, comparison: Comparison, draw: Draw = no_pictures) -> Comparison:
+def write_comparison(directory: RunDirectory, comparison: Comparison, views: Views = NO_VIEWS) -> Comparison:
     """Write ``comparison.json``, the reference and a run directory for each run, then the manifest."""
     reference = comparison.reference
     directory.write_table("reference.csv", reference.table)
@@ -52,22 +59,22 @@ def write_comparison(directory: RunDirectory, comparison: Comparison, draw: Draw
         directory.write_json("reference.json", {"energy": comparison.reference_energy.content()})
     directory.write_json("comparison.json", comparison.content())
     errors = [run.error for run in comparison.results if run.error]
-    results = _write_runs(directory, comparison.results, draw, "; ".join(errors) or None)
+    results = _write_runs(directory, comparison.results, views, "; ".join(errors) or None)
     return replace(comparison, results=results, directory=directory.path)
 
 
-def write_unfinished(directory: RunDirectory, runs: Sequence[Run], error: str) -> None:
+def write_unfinished(directory: RunDirectory, runs: Sequence[Run], error: str, views: Views = NO_VIEWS) -> None:
     """Write the runs of a comparison that could not be finished, a directory each, then the manifest with `error`."""
-    _write_runs(directory, runs, no_pictures, error)
+    _write_runs(directory, runs, views, error)
 
 
-def _write_runs(directory: RunDirectory, runs: Sequence[Run], draw: Draw, error: str | None) -> list[Run]:
+def _write_runs(directory: RunDirectory, runs: Sequence[Run], views: Views, error: str | None) -> list[Run]:
     folders = [RunDirectory(directory.path / run.label) for run in runs]
     for folder, run in zip(folders, runs, strict=True):
         _write_tables(folder, run)
-    missing = _drawn(directory, draw)
-    written = [_finish(folder, run, missing) for folder, run in zip(folders, runs, strict=True)]
-    directory.write_manifest(_dependencies(runs[0]) | {"pictures": missing}, error)
+    notes = _viewed(directory, runs[0], error, views)
+    written = [_finish(folder, run, notes) for folder, run in zip(folders, runs, strict=True)]
+    directory.write_manifest(_dependencies(runs[0]) | notes, error)
     return written
 
 
@@ -81,17 +88,24 @@ def _write_tables(directory: RunDirectory, run: Run) -> None:
     directory.write_json("summary.json", run.summary)
 
 
-def _drawn(directory: RunDirectory, draw: Draw) -> str | None:
-    """Let the pictures be drawn; return why there are none, if they cannot be."""
+def _viewed(directory: RunDirectory, run: Run, error: str | None, views: Views) -> dict[str, str | None]:
+    """Let pictures and page be made; return why there are none of either, None where there are."""
+    drawn = _failure(lambda: views.pictures(directory.path))
+    said = plain(manifest(_dependencies(run) | {"pictures": drawn}, error))
+    return {"pictures": drawn, "page": _failure(lambda: views.page(directory.path, said))}
+
+
+def _failure(make: Callable[[], object]) -> str | None:
+    """Return why something could not be made; None if it was."""
     try:
-        draw(directory.path)
+        make()
     except Exception as error:  # whatever it is: the numbers are there, and worth more
         return f"{type(error).__name__}: {error}"
     return None
 
 
-def _finish(directory: RunDirectory, run: Run, missing: str | None) -> Run:
-    directory.write_manifest(_dependencies(run) | {"pictures": missing}, run.error)
+def _finish(directory: RunDirectory, run: Run, notes: dict[str, str | None]) -> Run:
+    directory.write_manifest(_dependencies(run) | notes, run.error)
     return replace(run, directory=directory.path, manifest=read_json(directory.path / "manifest.json"))
 
 

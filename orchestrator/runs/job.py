@@ -31,15 +31,18 @@ from orchestrator.coupling.run.results import Table, plain, read_json, read_tabl
 from orchestrator.landing import audit, monolithic
 from orchestrator.runs.coupled import run_coupled
 from orchestrator.runs.directory import RunDirectory
+from orchestrator.runs.files import FIELD_UNITS
 from orchestrator.runs.summary import NO_LANDING, extremes, result
-from orchestrator.runs.systems import System, resolve
+from orchestrator.runs.systems import Fields, System, resolve
+from orchestrator.runs.whatif import leave
 from orchestrator.scenario.read import load
 from orchestrator.scenario.settings import texts
 from orchestrator.scenario.types import GraphScenario, LandingScenario, Scenario
 
 CATALOGUE = Path(documents.__file__).parent
 KEY_DIGITS = 16
-Outcome = tuple[Table, dict[str, Any]]
+Outcome = tuple[Table, Fields, dict[str, Any]]
+"""Signals and fields that are kept, and the summary."""
 
 
 @dataclass(frozen=True)
@@ -164,14 +167,18 @@ def found(job: Job, store: Path) -> Done | None:
 def make(job: Job, store: Path) -> None:
     """Run `job` and put its folder into `store`, whole or not at all; a run that fails leaves a folder that says why."""
     start, scenario = time.process_time(), job.loaded()
-    failure, table, summary = None, {}, {}
+    failure, table, fields, summary = None, {}, {}, {}
     try:
-        table, summary = SOLVERS[job.solver](job, scenario)
+        table, fields, summary = SOLVERS[job.solver](job, scenario)
     except (InputError, ModuleError, RunError) as error:
         failure = str(error)
     with put(store, job.key) as directory:
         if table:
             directory.write_table("results.csv", table)
+        if fields:
+            directory.write_fields("fields.h5", fields, FIELD_UNITS)
+        if failure is None and job.solver == "monolithic" and not job.signals:  # those with some are not looked at
+            leave(directory, resolve(scenario), others=False)
         directory.write_json("summary.json", summary)
         directory.write_manifest(_manifest(job, scenario) | {"cpu_s": time.process_time() - start}, failure)
 
@@ -239,7 +246,7 @@ def _monolithic(job: Job, scenario: Scenario) -> Outcome:
         _known(job, (*job.signals, *job.extremes), {"time": times, **first})
     solution = monolithic.solve(problem, times, job.tolerance, job.estimate)
     table = {"time": times, **solution.signals}
-    kept, fields = _kept(job, system, table), system.split(table)[0]
+    kept, fields, about = _kept(job, system, table), system.split(table)[0], system.about(table)
     judged = system.safety(table, fields, solution.estimated_error)
     energy = audit.of_coupled(table, scenario.simulation.tolerances.values())
     told = {*kept, *job.extremes}
@@ -252,9 +259,9 @@ def _monolithic(job: Job, scenario: Scenario) -> Outcome:
         "energy": energy.content() if energy is not None else None,
         **(judged.content() if judged is not None else NO_LANDING),
         "extremes": {name: extremes(times, table, name) for name in _known(job, job.extremes, table)},
-        **({"mesh": system.about(table)["mesh"]} if isinstance(scenario, LandingScenario) else {}),
+        **({key: about[key] for key in ("mesh", "geometry")} if isinstance(scenario, LandingScenario) else {}),
     }
-    return kept, summary
+    return kept, _shapes(job, fields), summary
 
 
 def _coupled(job: Job, scenario: Scenario) -> Outcome:
@@ -264,7 +271,8 @@ def _coupled(job: Job, scenario: Scenario) -> Outcome:
     if coupled.log.error is not None:
         raise RunError(str(coupled.log.error), coupled.log.error.time)
     _known(job, job.extremes, coupled.table)
-    return _kept(job, coupled.system, coupled.table), {"solver": job.solver, **result(coupled).summary}
+    kept, fields = _kept(job, coupled.system, coupled.table), _shapes(job, coupled.fields)
+    return kept, fields, {"solver": job.solver, **result(coupled).summary}
 
 
 def _kept(job: Job, system: System, table: Table) -> Table:
@@ -273,6 +281,11 @@ def _kept(job: Job, system: System, table: Table) -> Table:
     if not job.signals:
         return system.split(table)[1]
     return {name: table[name] for name in ("time", *_known(job, job.signals, table))}
+
+
+def _shapes(job: Job, fields: Fields) -> Fields:
+    """Return the shapes of the line where all signals are kept; they are what is largest."""
+    return fields if job.keep and not job.signals else {}
 
 
 def _known(job: Job, names: tuple[str, ...], table: Table) -> tuple[str, ...]:

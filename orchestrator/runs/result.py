@@ -204,7 +204,8 @@ class Run:
         lines += [self._missed(name) for name in missed(self.error_parts, self.tolerances, self.table)]
         lines += [f"{self.error}; the results up to there are kept"] if self.error else []
         lines += [self.safety] if self.safe is False else []
-        return lines + ([f"no pictures: {self.manifest['pictures']}"] if self.manifest.get("pictures") else [])
+        missing = {name: self.manifest.get(name) for name in ("pictures", "page")}
+        return lines + [f"no {name}: {why}" for name, why in missing.items() if why]
 
     def _missed(self, name: str) -> str:
         """Say which part of an error makes it miss its tolerance, and what helps."""

@@ -38,6 +38,7 @@ from orchestrator.landing import audit
 from orchestrator.landing.build import has_monolithic, problem
 from orchestrator.landing.contract import is_control, is_unused
 from orchestrator.landing.fields import cable_fields
+from orchestrator.landing.geometry import geometry
 from orchestrator.landing.impacts import Impact, impacts
 from orchestrator.landing.limits import limits_of
 from orchestrator.landing.resolve import MESH_KEYS, MESH_TOLERANCE, Landing, Variables
@@ -179,12 +180,13 @@ class LandingSystem:
         return cable_fields(table, self.landing.placement.cable_length, nodes), rest
 
     def about(self, table: Table) -> dict[str, Any]:
-        """Return stiffness set and robot, and which signals an energy audit would need."""
+        """Return stiffness set, robot and geometry, and which signals an energy audit would need."""
         robot = self.scenario.robot
         energy = {"verdict": None, "missing": audit.missing(table)}
         mesh = self.landing.mesh.content() if self.landing.mesh is not None else None
-        set_name = self.scenario.cable.stiffness_set
-        return {"stiffness_set": set_name, "robot": robot.model or robot.fmu, "mesh": mesh, "energy": energy}
+        rest = self.landing.rest.content() if self.landing.rest is not None else None
+        names = {"stiffness_set": self.scenario.cable.stiffness_set, "robot": robot.model or robot.fmu}
+        return {**names, "line": rest, "mesh": mesh, "energy": energy, "geometry": geometry(self.landing)}
 
     def warnings(self, table: Table) -> list[str]:
         """Return which wheels are where the mesh does not resolve what they do, a line each."""
@@ -325,7 +327,7 @@ class GraphSystem:
 
     def about(self, table: Table) -> dict[str, Any]:
         """Return nothing that only a landing has."""
-        return {"stiffness_set": None, "robot": None, "mesh": None, "energy": {}}
+        return {"stiffness_set": None, "robot": None, "line": None, "mesh": None, "energy": {}, "geometry": None}
 
     def warnings(self, table: Table) -> list[str]:
         """Return nothing: what a run of a general graph should not do is not known."""

@@ -8,7 +8,7 @@ from __future__ import annotations
 from collections.abc import Iterator
 
 from orchestrator.catalogue.conductor_spec import ConductorSpec, load_conductor
-from orchestrator.catalogue.documents import Document, parameters_of
+from orchestrator.catalogue.documents import Document, bare, parameters_of, table_of
 from orchestrator.catalogue.quantities import Complaint
 from orchestrator.coupling.errors import InputError, nearest
 from orchestrator.scenario.check import Known
@@ -28,7 +28,7 @@ def given(cable: Document) -> tuple[list[Given], list[Complaint]]:
         spec = load_conductor(name)
     except InputError as error:
         return [], [Complaint(f"cable.{CONDUCTOR}", problem) for problem in error.problems]
-    there = list(spec.stiffness_sets)
+    there, wanted = list(spec.sets), spec.default_set if wanted is None else wanted
     if wanted is None:
         return [], [Complaint(f"cable.{SET}", f"missing; {name} has {', '.join(there)}")]
     if not isinstance(wanted, str):
@@ -41,9 +41,29 @@ def given(cable: Document) -> tuple[list[Given], list[Complaint]]:
     return [line, pair], []
 
 
+def fill_set(plain: Document, provenance: dict[str, Provenance]) -> None:
+    """Write the name of the conductor's default set, where the scenario names none."""
+    spec = conductor_of(plain)
+    if spec is not None and spec.default_set is not None and SET not in plain["cable"]:
+        plain["cable"][SET] = spec.default_set
+        provenance[f"cable.{SET}"] = Provenance("the conductor's default", file=str(spec.path))
+
+
+def make_room_for_set(document: Document, above: Document) -> Iterator[str]:
+    """Take from `document` a set that the conductor which `above` names does not have, if that one has a default."""
+    below, own = table_of(document, "cable"), table_of(above, "cable")
+    spec = conductor_of({"cable": {CONDUCTOR: bare(own.get(CONDUCTOR))}})
+    if SET in own or spec is None or spec.default_set is None or SET not in below:
+        return
+    was = bare(below[SET])
+    if isinstance(was, str) and was not in spec.sets:
+        del below[SET]
+        yield f"cable: {spec.path.stem} has no set {was}; {spec.default_set} is taken"
+
+
 def fill_strength(plain: Document, provenance: dict[str, Provenance]) -> None:
     """Write the rated strength that limits of tension are counted by, where the scenario does not give it."""
-    spec = _conductor(plain)
+    spec = conductor_of(plain)
     strength = spec.rated_strength if spec is not None else None
     if spec is None or strength is None:
         return
@@ -53,7 +73,8 @@ def fill_strength(plain: Document, provenance: dict[str, Provenance]) -> None:
         provenance["limits.rated_strength"] = said(strength, spec.path)
 
 
-def _conductor(plain: Document) -> ConductorSpec | None:
+def conductor_of(plain: Document) -> ConductorSpec | None:
+    """Return the conductor that a scenario names; None if it names none, or none that there is."""
     cable = plain.get("cable")
     name = cable.get(CONDUCTOR) if isinstance(cable, dict) else None
     try:

@@ -9,9 +9,11 @@ from typing import Any
 from orchestrator.catalogue.documents import Document
 from orchestrator.catalogue.robot_spec import RobotSpec, load_robot
 from orchestrator.coupling.errors import InputError
-from orchestrator.scenario.types import Provenance
+from orchestrator.scenario.types import LandingScenario, Provenance
 
 MASS = "robot.parameters.mass"
+SCALED = "inertia scaled by"
+"""How the reason of an inertia begins that was found from the mass."""
 DIAGONAL = {"inertia.xx", "inertia.yy", "inertia.zz"}
 
 
@@ -36,12 +38,19 @@ def scale_inertia(plain: Document, provenance: dict[str, Provenance]) -> list[st
     if spec is None or not _is_mass(mass) or mass == spec.parameters["mass"]:
         return []
     ratio = mass / float(spec.parameters["mass"])
-    said = f"inertia scaled by {ratio:.4g} with the mass"
+    said = f"{SCALED} {ratio:.4g} with the mass"
     for name, value in spec.parameters.items():
         if name.startswith("inertia."):
             parameters[name] = ratio * value
             provenance[f"robot.parameters.{name}"] = Provenance(spec.name, said)
     return [f"{MASS}: {said}"]
+
+
+def goes_with_mass(scenario: LandingScenario) -> bool:
+    """Return whether another mass would bring another inertia: not where the scenario gives that, or of a foreign FMU."""
+    names = [f"robot.parameters.{name}" for name in scenario.robot.parameters if name.startswith("inertia.")]
+    found = all(scenario.provenance.get(name, Provenance()).reason.startswith(SCALED) for name in names)
+    return scenario.robot.fmu is None and found
 
 
 def _robot(model: Any) -> RobotSpec | None:

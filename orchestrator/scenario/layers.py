@@ -9,10 +9,21 @@ from pathlib import Path
 from typing import Any
 
 from orchestrator.catalogue import shelf
-from orchestrator.catalogue.documents import Document, Stack, chain, is_over_time, is_quantity, is_whole, leaves, merged
+from orchestrator.catalogue.documents import (
+    Document,
+    Stack,
+    bare,
+    chain,
+    is_over_time,
+    is_quantity,
+    is_whole,
+    leaves,
+    merged,
+)
 from orchestrator.catalogue.scenarios import find
 from orchestrator.coupling.errors import InputError
 from orchestrator.coupling.masters.options import master_options
+from orchestrator.scenario import line_state
 from orchestrator.scenario.named_sets import make_room
 from orchestrator.scenario.types import DEFAULT_MASTER
 
@@ -47,14 +58,14 @@ def lay(stack: Stack, above: Document, place: str) -> list[str]:
     master = bare(simulation.get("master")) if isinstance(simulation, dict) else None
     if isinstance(master, str):
         _make_room_for_master(stack.document, master)
-    notes += make_room(stack.document, above)
+    notes += _make_room(stack.document, above)
     stack.put(above, place)
     return notes
 
 
-def bare(value: Any) -> Any:
-    """Return the value of a quantity, or what is none as it is."""
-    return value["value"] if is_quantity(value) else value
+def _make_room(document: Document, above: Document) -> list[str]:
+    """Take from `document` what `above` gives anew by another name; return what is to be said of it."""
+    return [*make_room(document, above), *line_state.make_room(document, above)]
 
 
 def _sections(document: Document) -> Iterator[tuple[str, ...]]:
@@ -172,7 +183,7 @@ def override(stack: Stack, texts: Iterable[str], folder: Path) -> list[str]:
     for _, tables, given in parsed:
         together = merged(together, _within(tables, given))
     resolve_paths(together, folder)
-    notes = make_room(stack.document, together)
+    notes = _make_room(stack.document, together)
     for text, tables, given in parsed:
         table = stack.document
         for key in tables:

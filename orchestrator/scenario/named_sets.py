@@ -9,7 +9,7 @@ from __future__ import annotations
 from collections.abc import Iterator, Mapping
 
 from fmus.module.variables import Variable
-from orchestrator.catalogue.documents import Document, Stack, is_quantity, parameters_of, table_of
+from orchestrator.catalogue.documents import Document, Stack, bare, parameters_of, table_of
 from orchestrator.catalogue.quantities import Complaint
 from orchestrator.scenario import conductor, contact_set
 from orchestrator.scenario.check import Known
@@ -22,7 +22,8 @@ GIVERS = {"cable": conductor.given, "contact": contact_set.given}
 
 def make_room(document: Document, above: Document) -> list[str]:
     """Take from `document` what the sets give that `above` names; return what is to be said of it."""
-    return [note for section in GIVERS for note in _make_room(section, document, above)]
+    other_set = list(conductor.make_room_for_set(document, above))
+    return other_set + [note for section in GIVERS for note in _make_room(section, document, above)]
 
 
 def _make_room(section: str, document: Document, above: Document) -> Iterator[str]:
@@ -38,7 +39,7 @@ def _make_room(section: str, document: Document, above: Document) -> Iterator[st
 
 
 def _bare(section: Document) -> Document:
-    return {key: value["value"] if is_quantity(value) else value for key, value in section.items()}
+    return {key: bare(value) for key, value in section.items()}
 
 
 def fill_in(

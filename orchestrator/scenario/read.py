@@ -16,8 +16,9 @@ from orchestrator.catalogue.scenarios import find
 from orchestrator.coupling.errors import InputError
 from orchestrator.scenario import layers
 from orchestrator.scenario.check import check, known_variables, to_si
-from orchestrator.scenario.conductor import fill_strength, share_diameter
+from orchestrator.scenario.conductor import fill_set, fill_strength, share_diameter
 from orchestrator.scenario.inertia import scale_inertia
+from orchestrator.scenario.line_state import fill_expansion, state_problems
 from orchestrator.scenario.named_sets import fill_in
 from orchestrator.scenario.over_time import parse
 from orchestrator.scenario.types import GraphScenario, LandingScenario, Provenance, Scenario
@@ -57,11 +58,12 @@ def load(
         plain.setdefault("contact", {})  # it shares the line's diameter
     known, unknown = known_variables(plain)
     said, wrong = fill_in(plain, known, stack, provenance)
-    fill_strength(plain, provenance)
+    for fill in (fill_set, fill_strength, fill_expansion):
+        fill(plain, provenance)
     problems += [*unknown, *wrong, *to_si(plain, known, provenance), *share_diameter(plain, known, provenance)]
     notes += [*said, *scale_inertia(plain, provenance)]
     scenario, invalid = _validated(plain)
-    problems += [*invalid, *check(plain, known)]
+    problems += [*invalid, *check(plain, known), *state_problems(plain, known)]
     if problems or scenario is None:
         raise InputError(f"{stack.place_of(problem.path)}: {problem}" for problem in problems)
     return scenario.read_from(path, _with_robot_file(plain, provenance), notes)

@@ -50,6 +50,8 @@ Inputs = dict[str, Annotated[Any, AfterValidator(as_input)]]
 Positive = Annotated[float, Field(gt=0.0)]
 Count = Annotated[int, Field(ge=1)]
 NonNegative = Annotated[float, Field(ge=0.0)]
+Temperature = Annotated[float, Field(ge=-100.0, le=300.0)]
+"""°C, of a line."""
 
 
 @dataclass(frozen=True)
@@ -91,11 +93,48 @@ class Simulation(Section):
         return self
 
 
+class StateSection(Section):
+    """How the line is strung, and how warm and icy it is now; one of the first four is given.
+
+    Attributes
+    ----------
+    sag : m, in the middle, below half way between the supports' heights
+    horizontal_tension, tension_share : N; or as a share of the rated strength
+    unstretched_length : m
+    at_temperature : °C, at which the line is strung so, bare
+    temperature : °C, now; that of stringing if none is given
+    thermal_expansion : 1/K; the conductor's, where it has one
+    ice_thickness, ice_density : m of ice all around, now; kg/m³
+    """
+
+    sag: Annotated[Positive | None, In("m")] = None
+    horizontal_tension: Annotated[Positive | None, In("N")] = None
+    tension_share: Annotated[Annotated[float, Field(gt=0.0, le=1.0)] | None, In("1")] = None
+    unstretched_length: Annotated[Positive | None, In("m")] = None
+    at_temperature: Annotated[Temperature | None, In("degC")] = None
+    temperature: Annotated[Temperature | None, In("degC")] = None
+    thermal_expansion: Annotated[Positive | None, In("1/K")] = None
+    ice_thickness: Annotated[NonNegative, In("m")] = 0.0
+    ice_density: Annotated[Positive, In("kg/m3")] = 900.0
+
+    @property
+    def now(self) -> float | None:
+        """The temperature of the line now, °C."""
+        return self.at_temperature if self.temperature is None else self.temperature
+
+    @property
+    def growth(self) -> float:
+        """The unstretched length now by that of stringing."""
+        if self.temperature is None or self.at_temperature is None or self.thermal_expansion is None:
+            return 1.0
+        return 1.0 + self.thermal_expansion * (self.temperature - self.at_temperature)
+
+
 class CableSection(Section):
     """The cable: parameters by their names in the contract; `fmu` is a foreign one instead of ours.
 
     `conductor` is one of the catalogue, or a TOML file like those there; `stiffness_set` one of its sets. Without a
-    conductor the latter is a label. What `parameters` of the same file give wins.
+    conductor the latter is a label. What `parameters` of the same file give wins. `state`: how the line is strung.
     `steps`, here and below: steps that the FMU makes in each step of the master (docs/reference/masters.md).
     """
 
@@ -103,6 +142,7 @@ class CableSection(Section):
     conductor: str | None = None
     stiffness_set: str = "unnamed"
     steps: Count = 1
+    state: StateSection | None = None
     parameters: Settings = {}
 
 
@@ -311,9 +351,12 @@ Scenario = LandingScenario | GraphScenario
 """One scenario, checked; `isinstance` tells which kind."""
 
 
+SECTIONS_WITH_UNITS = {
+    "simulation": Simulation, "landing": LandingSection, "limits": LimitsSection, "cable.state": StateSection,
+}  # fmt: skip
 UNITS = {
     f"{section}.{name}": marker.unit
-    for section, model in (("simulation", Simulation), ("landing", LandingSection), ("limits", LimitsSection))
+    for section, model in SECTIONS_WITH_UNITS.items()
     for name, field in model.model_fields.items()
     for marker in field.metadata
     if isinstance(marker, In)

@@ -3,43 +3,31 @@
 from __future__ import annotations
 
 import time as clock
-from collections.abc import Callable, Mapping, Sequence
+from collections.abc import Callable, Mapping
 from dataclasses import dataclass, field
 from itertools import pairwise
 
 import numpy as np
 
-from fmus.cable import ports
-from fmus.cable.module import Cable
+from fmus.cable.module import N_SHAPE, Cable
 from fmus.cable.state import make_work
-from fmus.contact import places as at
-from fmus.contact.law import LEFT, law_parameters
+from fmus.contact.law import law_parameters
 from fmus.contact.module import Contact
-from fmus.kernels.rotations import follow_euler
 from fmus.kernels.time_integration import collocation
-from fmus.module.variables import ModuleError
-from fmus.robot import dynamics
-from fmus.robot import rigid_body as rb
+from fmus.module.variables import ModuleError, VariableTable
 from fmus.robot.module import Robot, body_parameters, initial_state
 from orchestrator.coupling.course import Course
 from orchestrator.coupling.exchange import only_couples
 from orchestrator.landing.monolithic import control as steps
-from orchestrator.landing.monolithic.contacts import face, settle
 from orchestrator.landing.monolithic.control_loads import ControlLoads
-from orchestrator.landing.monolithic.looks import begin, restart
+from orchestrator.landing.monolithic.entry import CONTACT, Shown, advance_straight, begin, make_shown, show
 from orchestrator.landing.monolithic.state import (
     ARC,
     AXLE_ALONG,
-    FRICTION_LOSS,
-    GONE,
     N_CONTACT,
     N_ROBOT,
-    NORMAL_MAX,
     OFF_CABLE,
     OK,
-    TIME,
-    TOUCH_TIME,
-    WALL_LOSS,
     State,
     System,
     make_space,
@@ -99,10 +87,16 @@ class Integrator:
     Parameters
     ----------
     refinement : the intervals between output times are divided into at least so many steps, or a multiple of it
-    start_time : s
+    start_time : s; None: not begun, to be packed alone (`starts.py`)
     """
 
-    def __init__(self, problem: Problem, tolerance: float = TOLERANCE, refinement: int = 1, start_time: float = 0.0):
+    def __init__(
+        self,
+        problem: Problem,
+        tolerance: float = TOLERANCE,
+        refinement: int = 1,
+        start_time: float | None = 0.0,
+    ):
         self.problem = problem
         cable, robot = problem.cable, problem.robot
         self.method = collocation(cable["spectral_radius"])
@@ -117,16 +111,12 @@ class Integrator:
         self.state = State(cable.state.copy(), start, np.zeros((2, N_ROBOT)), memory, np.zeros(1))
         self.work = make_work(cable.model.weight.size, cable.state.size)
         self.space = make_space(cable.model.weight.size, n_wheels)
-        self.refinement = refinement
-        self.longest = LONGEST * (tolerance / TOLERANCE) ** 0.25
+        longest = LONGEST * (tolerance / TOLERANCE) ** 0.25
         event = EVENT * (tolerance / TOLERANCE) ** 0.5
-        self.control = np.array([0.02 * self.longest, self.longest, tolerance, event, NEWTON, 0.0, 0.0, 0.0, 0.0])
-        if settle(self.system, self.state, False, self.space, self.work) != OK:
+        self.options = np.array([0.0, 0.0, longest, float(refinement)])
+        self.control = np.array([0.02 * longest, longest, tolerance, event, NEWTON, 0.0, 0.0, 0.0, 0.0])
+        if start_time is not None and begin(self.system, self.state, start_time, self.space, self.work) != OK:
             raise ModuleError("monolithic: the contact law fails at the start; check the initial pose of the robot")
-        for k in range(n_wheels):
-            begin(memory[k], self.space.out[0, k], start_time)
-            memory[k, TIME] = start_time
-            face(self.system, self.state, k, self.space)
 
     @property
     def steps(self) -> int:
@@ -146,9 +136,9 @@ class Integrator:
 
     def _advance(self, t: float, end: float) -> None:
         """Integrate over a time in which the control loads are straight."""
-        parts = self.refinement * max(1.0, np.ceil((end - t) / (self.refinement * self.longest) - 1e-9))
-        self.control[steps.LONGEST] = (end - t) / parts
-        status, reached = steps.advance(self.system, self.state, self.control, t, end, self.space, self.work)
+        status, reached = advance_straight(
+            self.system, self.state, self.control, self.options, t, end, self.space, self.work
+        )
         if status == OFF_CABLE:
             raise ModuleError(
                 f"monolithic: a wheel has run past a support, off the cable, at t = {reached:g} s; "
@@ -166,94 +156,47 @@ class Integrator:
             )
 
 
-def _contact_signals(out: np.ndarray, memory: np.ndarray) -> tuple[float, ...]:
-    """Return the signals of a contact in the order of `_Recorder.CONTACT`, from the law's results and its memory."""
-    return (
-        out[at.NORMAL],
-        np.hypot(out[at.FRICTION], out[at.FRICTION + 1]),
-        out[at.DEEPEST],
-        np.hypot(out[at.SLIP_VELOCITY], out[at.SLIP_VELOCITY + 1]),
-        out[at.CONTACT_LENGTH],
-        LEFT if memory[GONE] else out[at.STATUS],
-        memory[WALL_LOSS] + memory[FRICTION_LOSS],
-        out[at.WALL_ENERGY] + out[at.BRISTLE_ENERGY],
-        memory[ARC],
-        0.0 if memory[GONE] else out[at.RADIAL],
-        0.0 if memory[GONE] else out[at.LATERAL],
-        *memory[NORMAL_MAX : TOUCH_TIME + 1],
-    )
-
-
 class _Recorder:
     """Writes the modules' own outputs at the output times."""
-
-    CONTACT = (
-        "normal_force",
-        "friction_force",
-        "penetration",
-        "slip_velocity",
-        "contact_length",
-        "status",
-        "dissipated_energy",
-        "strain_energy",
-        "cable.s",
-        "radial_force",
-        "lateral_force",
-        "normal_force_max",
-        "penetration_max",
-        "slip_velocity_max",
-        "impulse",
-        "touch_time",
-    )
 
     def __init__(self, integrator: Integrator, n: int):
         self.integrator = integrator
         problem = integrator.problem
-        self.cable, self.robot = problem.cable, problem.robot
-        self.cable_names = self._names(self.cable.table.names("output"))
-        self.robot_names = self._names(self.robot.table.names("output"))
-        self.cable_at = self.cable.table.indices(self.cable_names)
-        self.robot_at = self.robot.table.indices(self.robot_names)
-        n_wheels = len(problem.contacts)
+        self.shown = shown_of(problem)
+        self.cable_names, self.cable_at = recorded(problem.cable.table)
+        self.robot_names, self.robot_at = recorded(problem.robot.table)
         self.cable_rows = np.zeros((n, len(self.cable_names)))
         self.robot_rows = np.zeros((n, len(self.robot_names)))
-        self.contact_rows = np.zeros((n, n_wheels, len(self.CONTACT)))
-        self._robot_state = self.robot.state.copy()
-        self._angles = self._robot_state[dynamics.ANGLES : dynamics.ANGLES + 3]
-
-    def _names(self, names: Sequence[str]) -> list[str]:
-        return [name for name in names if not (only_couples(name) or ".work" in name)]
+        self.contact_rows = np.zeros((n, len(problem.contacts), len(CONTACT)))
 
     def record(self, i: int) -> None:
         """Write row `i` from the present state."""
-        state, system, space = self.integrator.state, self.integrator.system, self.integrator.space
-        settle(system, state, False, space, self.integrator.work)
-        out = space.out[0]
-        for k in range(len(state.contacts)):
-            row, memory = out[k], state.contacts[k]
-            first = self.cable.table.index[f"port[{k + 1}].s"]
-            self.cable.values[first + ports.S] = memory[ARC]
-            loads = self.cable.values[first + ports.FORCE : first + ports.FORCE_RATE]
-            loads[:] = 0.0 if memory[GONE] else row[at.CABLE_FORCE : at.WHEEL_FORCE]
-            self.contact_rows[i, k] = _contact_signals(row, memory)
-            restart(memory)
-        self.cable.state[:] = state.cable
-        self.cable.show()
-        self.cable_rows[i] = self.cable.values[self.cable_at]
-        self._robot_state[: rb.RIGID] = state.robot
-        self._robot_state[dynamics.CONTROL_WORK] = state.control_work[0]
-        follow_euler(state.robot[rb.ATTITUDE : rb.VELOCITY], self._angles)
-        values = np.zeros(dynamics.BODY_OUTPUTS + dynamics.WHEEL_OUTPUTS * self.robot.n_wheels)
-        dynamics.outputs(system.robot, self._robot_state, values)
-        self.robot_rows[i] = values[self.robot_at - len(self.robot.table) + values.size]
+        one, shown = self.integrator, self.shown
+        show(one.system, one.state, shown, one.space, one.work)
+        nodes = one.problem.cable.nodes_at(one.state.cable)
+        cable = np.concatenate([part.ravel() for part in (shown.ports, shown.cable, shown.shape, nodes)])
+        self.cable_rows[i], self.robot_rows[i] = cable[self.cable_at], shown.robot[self.robot_at]
+        self.contact_rows[i] = shown.contacts[:, : len(CONTACT)]
 
     def signals(self) -> dict[str, np.ndarray]:
         """Return every signal by name."""
         found = {f"cable.{name}": self.cable_rows[:, j] for j, name in enumerate(self.cable_names)}
         found |= {f"robot.{name}": self.robot_rows[:, j] for j, name in enumerate(self.robot_names)}
         for k in range(self.contact_rows.shape[1]):
-            found |= {f"contact{k + 1}.{name}": self.contact_rows[:, k, j] for j, name in enumerate(self.CONTACT)}
+            found |= {f"contact{k + 1}.{name}": self.contact_rows[:, k, j] for j, name in enumerate(CONTACT)}
         return found
+
+
+def shown_of(problem: Problem) -> Shown:
+    """Return new room for what is shown of a problem."""
+    return make_shown(problem.robot.state, len(problem.contacts), N_SHAPE)
+
+
+def recorded(table: VariableTable) -> tuple[list[str], list[int]]:
+    """Return the outputs that are no companions of others and no work of the coupling, and their places among all."""
+    outputs = table.names("output")
+    places = [i for i, name in enumerate(outputs) if not (only_couples(name) or ".work" in name)]
+    return [outputs[i] for i in places], places
 
 
 def integrate(

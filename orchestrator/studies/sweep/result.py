@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+import warnings
 from collections.abc import Mapping
 from dataclasses import dataclass
 from functools import cached_property
@@ -105,6 +106,8 @@ def run(
     swept = run_all(
         read, folder / write.STORE, lambda found: write.save(folder, found), workers, timeout, progress, dask
     )
+    if (missing := write.page(folder)) is not None:
+        warnings.warn(missing, stacklevel=3)
     return Sweep(folder, swept)
 
 

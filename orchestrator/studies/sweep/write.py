@@ -59,6 +59,17 @@ def save(folder: Path, found: Swept) -> None:
     write_json(folder / RESULT, {**describe(found), **circumstances()})
 
 
+def page(folder: Path) -> str | None:
+    """Make the page of a sweep; return why there is none, if it cannot be made."""
+    from orchestrator.report.page import write_sweep
+
+    try:
+        write_sweep(folder)
+    except Exception as error:  # whatever it is: the numbers are there, and worth more
+        return f"no page: {type(error).__name__}: {error}"
+    return None
+
+
 def write_rows(path: Path, rows: Sequence[Mapping[str, Any]]) -> None:
     """Write rows as CSV: flags as 1 and 0, numbers that read back bit for bit, nothing where nothing is known."""
     names = list(dict.fromkeys(name for row in rows for name in row if name in ALWAYS or _is_known(rows, name)))
