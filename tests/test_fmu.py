@@ -171,7 +171,7 @@ def test_unzipped_fmus_that_nobody_uses_are_removed(tmp_path, monkeypatch):
 def test_messages_are_collected_with_their_percent_signs():
     instance = started(fmu("odd", "odd", fault=5))
     instance.step(0.0, 0.1)
-    assert instance.log == ["[warning] all of 100%s%n"]
+    assert list(instance.log) == ["[warning] all of 100%s%n"]
     instance.close()
 
 
@@ -264,7 +264,7 @@ def test_fmi3_arrays_types_and_states():
         assert outputs.values.tolist() == [5.0, 1.0, 1.0, 2.5]
         lag.restore(state)
     lag.release(state)
-    assert lag.log == ["[ok] made for 100% of the tests"]
+    assert list(lag.log) == ["[ok] made for 100% of the tests"]
     lag.close()
 
 

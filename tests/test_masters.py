@@ -244,7 +244,7 @@ def test_refused_rollback_ends_the_run(master):
 def test_error_and_fatal_end_the_run(master, status):
     graph = oscillator(**MILD)
     step = graph.components["b"].fmi.do_step
-    graph.components["b"].fmi.do_step = lambda t, h: step(t, h) if t < 0.045 else status
+    graph.components["b"].fmi.do_step = lambda t, h, none_before: step(t, h, none_before) if t < 0.045 else status
     log = run(graph, master, 0.01, 0.1, POSITIONS)
     assert log.error is not None
     assert log.error.status == status

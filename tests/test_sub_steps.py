@@ -136,7 +136,7 @@ def test_a_step_that_cannot_vary_is_kept_where_others_are_halved(tmp_path: Path)
     graph = Graph(parts, [Connection("lag.y[1]", "c.u")])
     lengths = []
     step = parts["lag"].fmi.do_step
-    parts["lag"].fmi.do_step = lambda t, h: lengths.append(h) or step(t, h)
+    parts["lag"].fmi.do_step = lambda t, h, none_before: lengths.append(h) or step(t, h, none_before)
     log = run(graph, "iqn_ils", 0.01, 0.02, ["lag.count"])
     assert log.error is None
     assert all(report.subdivisions == 1 for report in log.steps)

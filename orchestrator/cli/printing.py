@@ -39,6 +39,8 @@ def print_run(run: Run) -> None:
     summary = run.summary
     for note in run.wiring:
         complain(note)
+    for name, count in summary.get("fmu_warnings", {}).items():
+        complain(f"{name}: the FMU has warned {count} times; fmu.log has what it says")
     if summary.get("line"):
         print(rest_words(summary["line"]))
     rows = extremes(run.table, run.tolerances, summary["units"])

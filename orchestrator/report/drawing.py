@@ -65,7 +65,8 @@ def draw_run(directory: Path, run: Run, reference: Table | None = None) -> Itera
     if len(run.time) < 2:
         return
     folder = directory / "plots"
-    yield _overview(folder, run, reference)
+    if len(run.table) > 1:
+        yield _overview(folder, run, reference)
     plots.iterations(folder / "iterations.png", {legend(run): run.iterations})
     yield folder / "iterations.png"
     yield from _limits(folder, run)

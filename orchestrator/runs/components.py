@@ -2,7 +2,7 @@
 
 from __future__ import annotations
 
-from collections.abc import Iterator
+from collections.abc import Iterable, Iterator
 from contextlib import contextmanager
 
 from fmus.module.variables import ModuleError
@@ -38,7 +38,7 @@ def opened(system: System | Scenario) -> Iterator[Graph]:
 
 def master_of(scenario: Scenario, graph: Graph) -> Master:
     """Return the scenario's master for `graph`; `InputError` if it cannot couple these FMUs."""
-    known = recorded(graph)
+    known = recorded(graph, scenario)
     missing = [name for name in scenario.simulation.tolerances if name not in known]
     if missing:
         raise InputError(
@@ -50,8 +50,19 @@ def master_of(scenario: Scenario, graph: Graph) -> Master:
         raise InputError(f"{scenario.path}: {error}") from None
 
 
-def recorded(graph: Graph) -> list[str]:
-    """Return the signals worth keeping: outputs, without unused ports and what only serves the coupling; inputs over time."""
+def recorded(graph: Graph, scenario: Scenario) -> list[str]:
+    """Return the signals to keep: those that are asked for, else those worth it.
+
+    These are all outputs, without unused ports and what only serves the coupling, and the inputs over time.
+
+    Raises
+    ------
+    InputError : there is no such signal, or it is no number
+    """
+    wanted = scenario.simulation.record
+    if wanted is not None:
+        _require_known(wanted, graph, scenario)
+        return list(dict.fromkeys(wanted))
     contacts = sum(name.startswith("contact") for name in graph.components)
     outputs = [
         f"{component}.{name}"
@@ -60,6 +71,17 @@ def recorded(graph: Graph) -> list[str]:
         if port.causality == "output" and port.is_number and not is_idle(name, contacts)
     ]
     return [*outputs, *graph.courses]
+
+
+def _require_known(wanted: Iterable[str], graph: Graph, scenario: Scenario) -> None:
+    ports = {f"{component}.{name}": p for component, fmu in graph.components.items() for name, p in fmu.ports.items()}
+    unknown = [f"no such signal{nearest(name, ports)}" if name not in ports else "" for name in wanted]
+    texts = [
+        f"is a {ports[name].kind}, no number" if name in ports and not ports[name].is_number else "" for name in wanted
+    ]
+    wrong = {name: one or other for name, one, other in zip(wanted, unknown, texts, strict=True) if one or other}
+    if wrong:
+        raise InputError(f"{scenario.path}: simulation.record: {name}: {why}" for name, why in wrong.items())
 
 
 def is_idle(name: str, contacts: int) -> bool:

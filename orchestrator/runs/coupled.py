@@ -2,7 +2,7 @@
 
 from __future__ import annotations
 
-from collections.abc import Callable
+from collections.abc import Callable, Mapping
 from dataclasses import dataclass, field
 from functools import cached_property
 
@@ -12,6 +12,7 @@ from orchestrator.coupling.errors import InputError, RunError, digits
 from orchestrator.coupling.exchange import coarsest
 from orchestrator.coupling.fmu.failure import FmuError
 from orchestrator.coupling.fmu.instance import FIXED, SHORTER
+from orchestrator.coupling.fmu.messages import Messages
 from orchestrator.coupling.graph.graph import Graph
 from orchestrator.coupling.masters import StepReport
 from orchestrator.coupling.run.interrupt import Interruption, interruptible
@@ -48,7 +49,8 @@ class Coupled:
     fmus : file and SHA-256 of every component
     error_parts : estimated error of each signal judged; empty where no estimate was asked for
     estimate_failure : which parts of it failed, and why
-    notes : what of the wiring its author may not expect, a line each
+    notes : what of the wiring its author may not expect, and who ended it before its time, a line each
+    messages : of the FMUs that have said anything, by component
     """
 
     system: System
@@ -60,6 +62,7 @@ class Coupled:
     error_parts: dict[str, Parts] = field(default_factory=dict)
     estimate_failure: str = ""
     notes: list[str] = field(default_factory=list)
+    messages: Mapping[str, Messages] = field(default_factory=dict)
 
     @property
     def estimated_error(self) -> dict[str, float]:
@@ -111,11 +114,12 @@ def run_coupled(system: System | Scenario, progress: Reached = lambda _: None) -
         log = _simulated(system.scenario, graph, progress)
         fmus = {n: {"file": str(f.path), "sha256": f.sha256} for n, f in graph.components.items()}
         exchange = coarsest(fmu.exchange for fmu in graph.components.values())
-        notes = system.notes(graph)
+        notes = [*system.notes(graph), *([log.ended] if log.ended else [])]
+        messages = {name: fmu.log for name, fmu in graph.components.items() if fmu.log.count}
     if log.error is not None and len(log.time) < 2:
         raise RunError(str(log.error), 0.0)
     fields, table = system.split(log.table)
-    return Coupled(system, exchange, log, table, fields, fmus, notes=notes)
+    return Coupled(system, exchange, log, table, fields, fmus, notes=notes, messages=messages)
 
 
 def _simulated(scenario: Scenario, graph: Graph, progress: Reached) -> Log:
@@ -128,8 +132,8 @@ def _simulated(scenario: Scenario, graph: Graph, progress: Reached) -> Log:
 
         master = master_of(scenario, graph)
         try:
-            times = 0.0, simulation.stop_time, simulation.macro_step
-            return simulate(graph, master, *times, recorded(graph), on_step, simulation.timeout)
+            times = simulation.start_time, simulation.stop_time, simulation.macro_step
+            return simulate(graph, master, *times, recorded(graph, scenario), on_step, simulation.timeout)
         except (ValueError, TypeError) as error:
             raise InputError(f"{scenario.path}: {error}") from None
         except FmuError as error:

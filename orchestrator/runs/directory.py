@@ -5,7 +5,7 @@ from __future__ import annotations
 import platform
 import subprocess
 import time
-from collections.abc import Iterator, Mapping
+from collections.abc import Iterable, Iterator, Mapping
 from contextlib import contextmanager, suppress
 from functools import cache
 from importlib.metadata import PackageNotFoundError, version
@@ -16,7 +16,7 @@ from typing import Any
 import numpy as np
 
 from orchestrator.coupling.errors import InputError
-from orchestrator.coupling.run.results import write_fields, write_json, write_table
+from orchestrator.coupling.run.results import replacing, write_fields, write_json, write_table
 
 PACKAGES = ("line-landing", "numpy", "scipy", "numba", "fmpy", "pythonfmu")
 
@@ -64,6 +64,11 @@ class RunDirectory:
     def write_fields(self, name: str, fields: Mapping[str, np.ndarray], units: Mapping[str, str]) -> None:
         """Write arrays over time as HDF5, each with its attribute ``unit``."""
         write_fields(self.path / name, fields, units)
+
+    def write_lines(self, name: str, lines: Iterable[str]) -> None:
+        """Write `lines` of text."""
+        with replacing(self.path / name) as temporary:
+            temporary.write_text("".join(f"{line}\n" for line in lines), encoding="utf-8")
 
     def write_manifest(self, content: Mapping[str, Any], error: str | None = None) -> None:
         """Write ``manifest.json``, the last file; with `error` the run is marked as incomplete."""

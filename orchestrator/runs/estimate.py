@@ -72,11 +72,13 @@ def second(system: System) -> System | None:
     if ratio is None:
         return None
     step = ratio * scenario.simulation.macro_step
-    count = int(scenario.simulation.stop_time / step * (1.0 + 1e-9))
+    count = int(scenario.simulation.duration / step * (1.0 + 1e-9))
     if count < 2:
         return None
     inner = system.stepped(1.0 if ratio < 1.0 else ratio)
-    return inner.changed(_options(scenario, ratio), macro_step=step, stop_time=count * step)
+    return inner.changed(
+        _options(scenario, ratio), macro_step=step, stop_time=scenario.simulation.start_time + count * step
+    )
 
 
 def _options(scenario: Scenario, ratio: float) -> dict[str, Any]:

@@ -24,6 +24,7 @@ FIELD_UNITS = {
 }  # fmt: skip
 COUNTS = {"iterations": int, "subdivisions": int, "rejected": int, "columns": int, "converged": bool}
 """Columns of ``iterations.csv`` that are no real numbers."""
+FMU_LOG = "fmu.log"
 Manifest = dict[str, Any]
 
 
@@ -82,6 +83,8 @@ def _write_tables(directory: RunDirectory, run: Run) -> None:
     directory.write_table("iterations.csv", run.iterations)
     if run.fields:
         directory.write_fields("fields.h5", run.fields, FIELD_UNITS)
+    if run.messages:
+        directory.write_lines(FMU_LOG, run.messages)
     directory.write_json("summary.json", run.summary)
 
 
@@ -141,7 +144,12 @@ def read_run(directory: Path) -> Run:
         read_json(directory / "summary.json"),
         read_json(manifest) if manifest.is_file() else {},
         directory,
+        _lines(directory / FMU_LOG),
     )
+
+
+def _lines(path: Path) -> list[str]:
+    return path.read_text(encoding="utf-8").splitlines() if path.is_file() else []
 
 
 def read_comparison(directory: Path) -> Comparison:

@@ -73,6 +73,7 @@ class Run:
     summary : the content of ``summary.json``: cost, convergence, extremes, units …
     manifest : the content of ``manifest.json``: scenario, source of each value, FMUs, and why the run is not complete
     directory : where it was written; None if it was not
+    messages : what the FMUs have said, a line each; those of ``fmu.log``
     """
 
     table: Table
@@ -81,6 +82,7 @@ class Run:
     summary: dict[str, Any]
     manifest: dict[str, Any]
     directory: Path | None = field(default=None)
+    messages: list[str] = field(default_factory=list)
 
     @property
     def time(self) -> np.ndarray:

@@ -23,7 +23,9 @@ def result(coupled: Coupled) -> Run:
     error = coupled.log.error
     content = {"complete": error is None, "error": None if error is None else str(error)}
     content |= manifest(coupled.scenario, coupled.fmus)
-    return Run(coupled.table, coupled.steps_table, coupled.fields, plain(summary(coupled)), plain(content))
+    tables = coupled.table, coupled.steps_table, coupled.fields
+    said = [f"{n}: {line}" for n, log in coupled.messages.items() for text in log for line in text.splitlines()]
+    return Run(*tables, plain(summary(coupled)), plain(content), messages=said)
 
 
 def manifest(scenario: Scenario, fmus: Mapping[str, Any]) -> dict[str, Any]:
@@ -63,6 +65,7 @@ def summary(coupled: Coupled) -> dict[str, Any]:
         "estimated_error": {name: parts.content() for name, parts in coupled.error_parts.items()},
         "estimate_failure": coupled.estimate_failure,
         "interface_balance": interface_balance(coupled.table, log.energy),
+        "fmu_warnings": {name: m.warnings for name, m in coupled.messages.items() if m.warnings},
         "units": {"time": "s"} | {name: log.units[name] for name in coupled.table if name in log.units},
         "extremes": {n: extremes(log.time, coupled.table, n) for n in coupled.table if n != "time"},
     }

@@ -14,6 +14,7 @@ from fmus.cable.mesh import TOLERANCE
 from orchestrator.catalogue import library
 from orchestrator.catalogue import modules as vocabulary
 from orchestrator.coupling.course import Course
+from orchestrator.coupling.errors import digits
 from orchestrator.coupling.exchange import (
     EXCHANGES,
     PARAMETER,
@@ -255,7 +256,8 @@ class GraphSystem:
         components: dict[str, Fmu] = {}
         try:
             for name, section in self.scenario.components.items():
-                components[name] = instance(section.fmu or library.module_fmu(str(section.model)), name, section.steps)
+                file = section.fmu or library.module_fmu(str(section.model))
+                components[name] = instance(file, name, section.steps, section.continuous)
             connections = [Connection.parse(text) for text in self.scenario.connections]
             supply = Supply(components, connections)
             for name, section in self.scenario.components.items():
@@ -276,7 +278,29 @@ class GraphSystem:
             for name, fmu in graph.components.items()
             if self._follows(name)
         ]
-        return [*filter(None, fallen), *_unfed(graph.unfed), *_means_alone(graph)]
+        said = [*filter(None, fallen), *_unfed(graph.unfed), *_means_alone(graph)]
+        return [*said, *self._discrete(graph), *self._below(graph), *_silent(graph)]
+
+    @property
+    def _foreign(self) -> dict[str, Component]:
+        return {name: section for name, section in self.scenario.components.items() if section.fmu is not None}
+
+    def _discrete(self, graph: Graph) -> list[str]:
+        """Return that reals of foreign FMUs in loops are declared discrete, if any are."""
+        loops = [text for text in graph.discrete_loops if {*map(owner_of, text.split(" -> "))} & {*self._foreign}]
+        what = f"reals in a loop, declared discrete, are exchanged after each step alone: {', '.join(loops)}"
+        cure = 'no master iterates over them; if they are continuous, say at their component continuous = ["x"]'
+        return [f"{what}; {cure}"] if loops else []
+
+    def _below(self, graph: Graph) -> list[str]:
+        """Return which foreign FMUs are stepped by less than the step that they are made for."""
+        H = self.scenario.simulation.macro_step
+        own = {name: graph.components[name].own_step or 0.0 for name in self._foreign}
+        short = {
+            name: H / part.steps for name, part in self._foreign.items() if H / part.steps < own[name] * (1.0 - 1e-9)
+        }
+        what = "are below the step size of its default experiment"
+        return [f"{n}: its steps of {digits(h)} s {what}, {digits(own[n])} s" for n, h in short.items()]
 
     def _courses(self) -> Iterator[tuple[str, str, Course]]:
         """Yield component, input and course of the inputs over time."""
@@ -374,6 +398,13 @@ def _means_alone(graph: Graph) -> list[str]:
     driven = {name: fmu.driven.without_slope for name, fmu in graph.components.items() if fmu.driven is not None}
     what = "given as the mean over each macro step, without slope: the FMU has no input"
     return [f"{n}: {', '.join(stems(ins))} {what} {suffixed(ins[0], RATE)}" for n, ins in driven.items() if ins]
+
+
+def _silent(graph: Graph) -> list[str]:
+    """Return that no FMU shows anything, if that is so."""
+    if any(p.causality == "output" and p.is_number for fmu in graph.components.values() for p in fmu.ports.values()):
+        return []
+    return ['no FMU has a numeric output: choose local variables, [simulation] record = ["component.variable"]']
 
 
 def _scaled(section: Stepped, known: Variables, ratio: float) -> Stepped:

@@ -167,15 +167,16 @@ def _is_like(value: Any, default: Any) -> bool:
 
 def _step_problems(document: Document) -> Iterator[Complaint]:
     simulation = table_of(document, "simulation")
-    stop, step = simulation.get("stop_time"), simulation.get("macro_step")
-    if not (_is_number(stop) and _is_number(step) and 0.0 < step < float("inf") and 0.0 < stop < float("inf")):
+    start, stop, step = (simulation.get(key, 0.0) for key in ("start_time", "stop_time", "macro_step"))
+    if not (_is_number(start) and _is_number(stop) and _is_number(step) and 0.0 < step < float("inf")):
         return
-    n = max(1, round(stop / step))
-    if abs(n * step - stop) > 1e-9 * stop:
-        yield Complaint(
-            "simulation.macro_step",
-            f"{digits(step)} s does not divide stop_time {digits(stop)} s; {digits(stop / n)} s does",
-        )
+    span = stop - start
+    if not 0.0 < span < float("inf"):
+        return
+    n = max(1, round(span / step))
+    if abs(n * step - span) > 1e-9 * span:
+        what = f"stop_time {digits(stop)} s" if start == 0.0 else f"the {digits(span)} s from start_time to stop_time"
+        yield Complaint("simulation.macro_step", f"{digits(step)} s does not divide {what}; {digits(span / n)} s does")
 
 
 def _is_number(value: Any) -> TypeGuard[float]:

@@ -62,19 +62,35 @@ class In:
 
 
 class Simulation(Section):
-    """Times in s. `tolerances`: the largest `relative_max_error` that `compare` lets pass, by signal.
+    """Times in s. `start_time`: of a general graph; a landing starts at 0.
+
+    `tolerances`: the largest `relative_max_error` that `compare` lets pass, by signal.
 
     `estimate`: by which second run `run` estimates the error of those signals, if any (docs/concepts/error.md). `timeout`: wall
-    time that an FMU may take for one step or its initialisation; none: as long as it likes.
+    time that an FMU may take for one step or its initialisation; none: as long as it likes. `record`: the signals that are
+    kept, ``component.variable``, of any causality; none: all outputs.
     """
 
-    stop_time: Annotated[Positive, In("s")]
+    start_time: Annotated[float, In("s")] = 0.0
+    stop_time: Annotated[float, In("s")]
     macro_step: Annotated[Positive, In("s")]
     master: str = DEFAULT_MASTER
     exchange: Choice | None = None
     tolerances: dict[str, Positive] = {}
     estimate: Literal["finer", "coarser", "none"] = "finer"
     timeout: Annotated[Positive | None, In("s")] = None
+    record: Annotated[list[str], Field(min_length=1)] | None = None
+
+    @property
+    def duration(self) -> float:
+        """From start to stop, s."""
+        return self.stop_time - self.start_time
+
+    @model_validator(mode="after")
+    def _forward(self) -> Self:
+        if not self.duration > 0.0:
+            raise ValueError(f"stop_time {self.stop_time:g} s must be after the start at {self.start_time:g} s")
+        return self
 
 
 class StateSection(Section):
@@ -223,11 +239,15 @@ class LimitsSection(Section):
 
 
 class Component(Section):
-    """One FMU of a general graph: any (`fmu`), or one of our modules (`model`)."""
+    """One FMU of a general graph: any (`fmu`), or one of our modules (`model`).
+
+    `continuous`: real variables that it declares discrete, and are not.
+    """
 
     model: str | None = None
     fmu: str | None = None
     steps: Count = 1
+    continuous: list[str] = []
     parameters: Settings = {}
     inputs: Inputs = {}
 
@@ -310,6 +330,14 @@ class LandingScenario(_Common):
     contact: ContactSection = ContactSection()
     landing: LandingSection
     limits: LimitsSection = LimitsSection()
+
+    @model_validator(mode="after")
+    def _from_the_beginning(self) -> Self:
+        if self.simulation.start_time != 0.0:
+            raise ValueError(
+                "simulation.start_time: a landing starts at 0 s; leave it out, or shift the inputs over time"
+            )
+        return self
 
 
 class GraphScenario(_Common):

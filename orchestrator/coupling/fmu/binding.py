@@ -9,14 +9,21 @@ from __future__ import annotations
 
 import ctypes
 from collections.abc import Callable
-from ctypes import CFUNCTYPE, byref, c_bool, c_double, c_int, c_size_t, c_void_p
+from ctypes import CFUNCTYPE, byref, c_bool, c_char, c_double, c_int, c_size_t, c_uint, c_void_p
 from functools import partial
 from pathlib import Path
 from typing import Any, ClassVar
 
 import numpy as np
 from fmpy import calloc, free
-from fmpy.fmi1 import FMICallException
+from fmpy.fmi1 import (
+    FMICallException,
+    FMU1Slave,
+    fmi1CallbackAllocateMemoryTYPE,
+    fmi1CallbackFreeMemoryTYPE,
+    fmi1CallbackFunctions,
+    fmi1CallbackLoggerTYPE,
+)
 from fmpy.fmi2 import (
     FMU2Slave,
     fmi2CallbackAllocateMemoryTYPE,
@@ -27,9 +34,17 @@ from fmpy.fmi2 import (
 from fmpy.fmi3 import FMU3Slave
 from fmpy.model_description import ModelDescription
 
+from orchestrator.coupling.fmu.printf import logger
+
 OK, WARNING, DISCARD, ERROR, FATAL = range(5)
 LABELS = ("ok", "warning", "discard", "error", "fatal", "pending")
 
+TERMINATED = 3
+"""Kind of status of FMI 2.0: whether the FMU wants the simulation to end."""
+ROUNDING = 16 * np.finfo(float).eps
+"""Relative distance of two times that are meant to be one."""
+PYTHONFMU = "PythonFMU"
+"""How the generation tool of FMUs is called whose messages are no formats."""
 Call = Callable[[], int]
 Sink = Callable[[int, str], None]
 SavedState = c_void_p
@@ -68,9 +83,12 @@ class Fmi2:
             instanceName=name,
         )
         self.sink = sink
+        self.python = PYTHONFMU in str(description.generationTool or "")
+        self._logger = logger(sink, final=self.python)  # kept as long as the FMU
         self._instantiate()
         self.component = self.slave.component
         self._do_step = self._raw(f"{self.PREFIX}DoStep", c_double, c_double, c_int)
+        self._boolean_status = self._raw(f"{self.PREFIX}GetBooleanStatus", c_int, c_void_p)
         self._get_state = self._raw(f"{self.PREFIX}Get{self.STATE}", c_void_p)
         self._set_state = self._raw(f"{self.PREFIX}Set{self.STATE}", c_void_p)
         self._free_state = self._raw(f"{self.PREFIX}Free{self.STATE}", c_void_p)
@@ -81,8 +99,8 @@ class Fmi2:
 
     def _instantiate(self) -> None:
         callbacks = fmi2CallbackFunctions()
-        # FMPy's own logger goes through printf, which crashes on a stray '%'; messages are taken as they come
-        callbacks.logger = fmi2CallbackLoggerTYPE(lambda _e, _n, status, _c, text: self.sink(status, _text(text)))
+        # FMPy's own logger goes through printf, which crashes on a stray '%'
+        callbacks.logger = ctypes.cast(self._logger, fmi2CallbackLoggerTYPE)
         callbacks.allocateMemory = fmi2CallbackAllocateMemoryTYPE(calloc)
         callbacks.freeMemory = fmi2CallbackFreeMemoryTYPE(free)
         self.slave.instantiate(callbacks=callbacks, loggingOn=True)
@@ -91,7 +109,7 @@ class Fmi2:
         """Return a function of the library with its instance filled in; what is missing there answers with an error."""
         if not hasattr(self.slave.dll, function):
             return lambda *_: self._missing(function)
-        prototype = CFUNCTYPE(c_int, c_void_p, *arguments)
+        prototype = CFUNCTYPE(c_uint, c_void_p, *arguments)  # a negative status is none
         return partial(prototype((function, self.slave.dll)), self.component)
 
     def _missing(self, function: str) -> int:
@@ -118,9 +136,21 @@ class Fmi2:
             tail = (seed.ctypes.data, seed.size, out.ctypes.data, out.size)
         return call(unknown.ctypes.data, unknown.size, known.ctypes.data, known.size, *tail)
 
-    def do_step(self, t: float, h: float) -> int:
-        """Advance from `t` to `t + h`; rollback behind `t` stays allowed."""
-        return self._do_step(t, h, 0)
+    def do_step(self, t: float, h: float, forward: bool) -> int:
+        """Advance from `t` to `t + h`; `forward`: no state from before `t` will be restored any more."""
+        return self._do_step(t, h, forward)
+
+    def asks_for_the_end(self, t: float) -> bool:
+        """Return whether a step from `t` that was discarded says that the simulation shall end there."""
+        if self.python:  # each of its discards says so
+            return False
+        value = c_int(0)
+        return self._boolean_status(TERMINATED, byref(value)) <= WARNING and bool(value.value)
+
+    @property
+    def ends(self) -> bool:
+        """Whether the step that has just been made shall be the last."""
+        return False
 
     def get_state(self, state: SavedState) -> int:
         """Save the FMU's state in `state`."""
@@ -202,17 +232,86 @@ class Fmi3(Fmi2):
         base = self.flags.ctypes.data
         self._out = (base, base + 1, base + 2, self.reached.ctypes.data)
 
-    def do_step(self, t: float, h: float) -> int:
-        """Advance from `t` to `t + h`; a step cut short or a wish to end counts as discard."""
-        status = self._do_step(t, h, False, *self._out)
-        if status <= WARNING and (self.flags[1] or self.flags[2]):
+    def do_step(self, t: float, h: float, forward: bool) -> int:
+        """Advance from `t` to `t + h`; a step cut short counts as discard."""
+        self.flags[:], self.reached[0] = False, t + h
+        status = self._do_step(t, h, forward, *self._out)
+        if status <= WARNING and self._cut_short(t + h):
             self.sink(DISCARD, f"the FMU stopped at {self.reached[0]:g} s")
             return DISCARD
         return status
 
+    def _cut_short(self, end: float) -> bool:
+        """Return whether the step did not come to its `end`."""
+        early = self.flags[2] or (self.flags[1] and self.reached[0] < end - ROUNDING * abs(end))
+        return bool(early)
+
+    def asks_for_the_end(self, t: float) -> bool:
+        """Return whether a step from `t` that was discarded says that the simulation shall end there."""
+        return bool(self.flags[1])
+
+    @property
+    def ends(self) -> bool:
+        """Whether the step that has just been made shall be the last."""
+        return bool(self.flags[1])
+
     def enter_initialization(self, start: float, stop: float | None) -> int:
         """Enter initialisation."""
         return self._checked(lambda: self.slave.enterInitializationMode(startTime=start, stopTime=stop))
+
+
+class Fmi1(Fmi2):
+    """One FMI 1.0 co-simulation instance: no saved states, no initialisation mode, no derivatives.
+
+    It is initialised with its start values, as the standard has it, and given its inputs afterwards.
+    """
+
+    TYPES: ClassVar[dict[str, tuple[str, type]]] = Fmi2.TYPES | {"Boolean": ("Boolean", np.int8)}
+
+    def __init__(self, description: ModelDescription, folder: Path, name: str, sink: Sink):
+        self._prefix = f"{description.coSimulation.modelIdentifier}_"
+        super().__init__(description, folder, name, sink)
+        self._do_step = self._raw("fmi2DoStep", c_double, c_double, c_char)
+
+    @staticmethod
+    def _load(**arguments: Any) -> Any:
+        return FMU1Slave(**arguments)
+
+    def _instantiate(self) -> None:
+        self._callbacks = fmi1CallbackFunctions()
+        self._callbacks.logger = ctypes.cast(self._logger, fmi1CallbackLoggerTYPE)
+        self._callbacks.allocateMemory = fmi1CallbackAllocateMemoryTYPE(calloc)
+        self._callbacks.freeMemory = fmi1CallbackFreeMemoryTYPE(free)
+        self.slave.instantiate(functions=self._callbacks, loggingOn=True)
+
+    def _raw(self, function: str, *arguments: Any) -> Callable[..., int]:
+        """Return a function of the library, whose name begins with that of the model."""
+        return super()._raw(self._prefix + function.replace("fmi2", "fmi"), *arguments)
+
+    def do_step(self, t: float, h: float, forward: bool) -> int:
+        """Advance from `t` to `t + h`; the last step is never repeated."""
+        return self._do_step(t, h, b"\x01")
+
+    def asks_for_the_end(self, t: float) -> bool:
+        """Return False: the standard knows no such wish."""
+        return False
+
+    def enter_initialization(self, start: float, stop: float | None) -> int:
+        """Initialise."""
+        return self._checked(lambda: self.slave.initialize(start, stop))
+
+    def exit_initialization(self) -> int:
+        """Do nothing: it is initialised."""
+        return OK
+
+    def free(self) -> None:
+        """Free the instance; the library stays loaded (other instances use it)."""
+        self.slave.fmi1FreeSlaveInstance(self.component)
+
+
+def binding_of(version: str) -> type[Fmi2]:
+    """Return the calls of a version of FMI."""
+    return {"1": Fmi1, "3": Fmi3}.get(version[:1], Fmi2)
 
 
 def finalize_python(library: Any) -> None:

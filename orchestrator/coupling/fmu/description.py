@@ -139,10 +139,17 @@ def read_description(path: Path) -> tuple[ModelDescription, str]:
     if description.coSimulation is None:
         raise ValueError(f"{path}: no co-simulation FMU; export it for co-simulation")
     if str(description.fmiVersion).startswith("1"):
-        raise ValueError(f"{path}: FMI {description.fmiVersion} is not supported; export it for FMI 2.0 or 3.0")
+        _read_capabilities(path, description.coSimulation)
     if str(description.fmiVersion).startswith("3"):
         description.coSimulation.providesDirectionalDerivative = _provides_derivatives(path)
     return description, sha256
+
+
+def _read_capabilities(path: Path, interface: Any) -> None:
+    """Write what an FMI 1.0 description says of its capabilities to FMPy's, which leaves them out."""
+    said = _model_description(path).find("Implementation/*/Capabilities")
+    for name in ("canHandleVariableCommunicationStepSize", "canBeInstantiatedOnlyOncePerProcess"):
+        setattr(interface, name, said is not None and said.get(name) in ("true", "1"))
 
 
 def _provides_derivatives(path: Path) -> bool:

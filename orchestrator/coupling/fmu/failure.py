@@ -27,3 +27,17 @@ class FmuError(Exception):
     def recoverable(self) -> bool:
         """Whether a shorter step may help."""
         return self.status in (DISCARD, NOT_FINITE)
+
+
+class FmuEnd(Exception):
+    """An FMU asks for the end of the simulation; nothing has failed.
+
+    Attributes
+    ----------
+    component : name of the instance
+    time : s, up to which the run has come
+    """
+
+    def __init__(self, component: str, time: float):
+        super().__init__(f"{component} asks for the end of the simulation at t = {time:.9g} s")
+        self.component, self.time = component, time

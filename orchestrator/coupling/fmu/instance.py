@@ -9,8 +9,8 @@ from __future__ import annotations
 import atexit
 import contextlib
 import logging
-import re
 from collections.abc import Iterable, Mapping, Sequence
+from dataclasses import replace
 from pathlib import Path
 from time import perf_counter
 from typing import Any, Self
@@ -27,24 +27,23 @@ from orchestrator.coupling.fmu.binding import (
     FATAL,
     LABELS,
     WARNING,
-    Fmi2,
-    Fmi3,
     SavedState,
+    binding_of,
     finalize_python,
 )
 from orchestrator.coupling.fmu.description import Port, Value, capabilities_of, ports_of, read_description
 from orchestrator.coupling.fmu.driven import Driven
-from orchestrator.coupling.fmu.failure import NOT_FINITE, FmuError
+from orchestrator.coupling.fmu.failure import NOT_FINITE, FmuEnd, FmuError
 from orchestrator.coupling.fmu.group import Group
+from orchestrator.coupling.fmu.messages import Messages
 from orchestrator.coupling.fmu.python_modules import own_modules
+from orchestrator.coupling.fmu.saved_states import SavedStates
 from orchestrator.coupling.fmu.unzipped import unzip
 from orchestrator.coupling.fmu.vocabulary import vocabulary_of
 
 logging.getLogger("fmus").addHandler(logging.NullHandler())  # what our FMUs say comes through FMI, like that of others
 
 SHORTER = "; a smaller macro step may help"
-EXCEPTION = re.compile(r"(\w+\.)*\w*(Error|Exception)\b")
-"""How a line begins that names an exception of Python."""
 ROUNDING = 16 * np.finfo(float).eps
 """Relative distance to the stop time within which a step is meant to end there."""
 FIXED = "; it cannot vary its step (canHandleVariableCommunicationStepSize is false), take the macro step that it is made for"
@@ -52,12 +51,13 @@ CURES = {DISCARD: SHORTER, NOT_FINITE: SHORTER}
 
 
 class Fmu:
-    """One instance of a co-simulation FMU (FMI 2.0 or 3.0); a context manager that frees it at its end.
+    """One instance of a co-simulation FMU (FMI 1.0, 2.0 or 3.0); a context manager that frees it at its end.
 
     Parameters
     ----------
     path : the ``.fmu`` file
     name : instance name; the model's name if none is given
+    continuous : real variables that it declares discrete, and are not
 
     Attributes
     ----------
@@ -65,7 +65,7 @@ class Fmu:
     ports : the variables by name
     vocabulary : the names among them that mean what they say (`orchestrator.coupling.exchange`): ``X_rate`` is there if its
         unit is that of X per second, or if it is declared to be the slope of X
-    log : messages of the FMU
+    log : its messages
     parameters : what `set_parameters` was given
     driven : the inputs that follow courses over time, if any
     solves, wall : steps made and the seconds spent in them
@@ -75,22 +75,25 @@ class Fmu:
     abandoned : a call of this run was given up and may still return: nothing of it may be touched any more
     """
 
-    def __init__(self, path: str | Path, name: str | None = None):
+    def __init__(self, path: str | Path, name: str | None = None, continuous: Iterable[str] = ()):
         self.path = Path(path)
         self.description, self.sha256 = read_description(self.path)
         self.name = name or str(self.description.modelName)
         self.ports = {p.name: p for v in self.description.modelVariables for p in ports_of(v)}
+        self.continuous = tuple(continuous)
+        self.ports |= {name: _continuous(self, name) for name in self.continuous}
         self.vocabulary = vocabulary_of(self.description, self.ports)
         self.capabilities = capabilities_of(self.description)
-        self.log: list[str] = []
+        self.log = Messages()
         self.parameters: dict[str, Value] = {}
         self.driven: Driven | None = None
+        self._states = SavedStates()
         self.solves, self.wall, self.time, self.busy_since = 0, 0.0, 0.0, 0.0
         self.stop = np.nan
         self.worst, self.initialized = 0, False
         _require_possible(self)
         self.abandoned = False
-        binding = Fmi3 if str(self.description.fmiVersion).startswith("3") else Fmi2
+        binding = binding_of(str(self.description.fmiVersion))
         try:
             self.folder = unzip(self.path, self.sha256)
             loaded = [other.folder for other in _instances]
@@ -98,9 +101,9 @@ class Fmu:
                 own_modules(self.folder, loaded),
                 contextlib.chdir("."),
             ):  # FMPy stays in the library's folder if that cannot be loaded
-                self.fmi = binding(self.description, self.folder, self.name, self._message)
+                self.fmi = binding(self.description, self.folder, self.name, self.log.add)
         except Exception as error:
-            hint = f" ({_gist(self.log[-1])})" if self.log else ""
+            hint = f" ({self.log.cause})" if self.log.cause else ""
             raise ValueError(f"{self.path}: the FMU cannot be loaded: {error}{hint}") from error
         _instances.append(self)
 
@@ -109,10 +112,6 @@ class Fmu:
 
     def __exit__(self, *_: object) -> None:
         self.close()
-
-    def _message(self, status: int, text: str) -> None:
-        label = LABELS[status] if 0 <= status < len(LABELS) else str(status)
-        self.log.append(f"[{label}] {text}")
 
     def error(self, status: int, doing: str, cure: str = "") -> FmuError:
         """Return the error for a call that came back with `status`."""
@@ -123,8 +122,12 @@ class Fmu:
 
     def failure(self, status: int, what: str, cure: str = "") -> FmuError:
         """Return the error that says `what` happened, with the FMU's own last words and a cure."""
-        said = f"; the FMU says: {_gist(self.log[-1])}" if self.log else ""
-        return FmuError(self.name, self.time, status, what + said + (cure or CURES.get(status, "")))
+        said = f"; the FMU says: {self.log.cause}" if self.log.cause else ""
+        return FmuError(self.name, self.time, status, what + said + (cure or self._cure(status)))
+
+    def _cure(self, status: int) -> str:
+        """Return what may help: a smaller step where one has failed, and the FMU can make others."""
+        return CURES.get(status, "") if self.solves and self.capabilities.variable_step else ""
 
     @property
     def closed(self) -> bool:
@@ -171,6 +174,12 @@ class Fmu:
         self.driven = Driven(self, courses, {*self.parameters, *taken}) if courses else None
 
     @property
+    def own_step(self) -> float | None:
+        """The step size of its default experiment, s; None where it names none."""
+        default = self.description.defaultExperiment
+        return float(default.stepSize) if default is not None and default.stepSize else None
+
+    @property
     def exchange(self) -> str:
         """What the FMU assumes of the motion inside a step (`held`, `point`, …), empty if it has no such parameter."""
         port = self.ports.get(PARAMETER)
@@ -178,7 +187,7 @@ class Fmu:
 
     def twin(self) -> Fmu:
         """Return a second instance with the same parameters, not initialised."""
-        twin = Fmu(self.path, self.name)
+        twin = Fmu(self.path, self.name, self.continuous)
         twin.set_parameters(self.parameters)
         if self.driven is not None:
             twin.follow(self.driven.courses, self.driven.taken)
@@ -240,6 +249,7 @@ class Fmu:
         self.initialized = True
 
     def _call(self, doing: str, function: Any, *arguments: Any) -> None:
+        self.log.begin()
         self.busy_since = perf_counter()
         status = function(*arguments)
         self.busy_since = 0.0
@@ -254,12 +264,16 @@ class Fmu:
         self.solves += 1
         if self.driven is not None:
             self.driven.set_step(t, h)
+        self.log.begin()
         self.busy_since = clock = perf_counter()
-        status = self.fmi.do_step(t, h)
+        status = self.fmi.do_step(t, h, self._states.none_before(t))
         self.wall += perf_counter() - clock
         self.busy_since = 0.0
+        if status == DISCARD and self.fmi.asks_for_the_end(t):
+            raise FmuEnd(self.name, t)
         if status > WARNING:
             raise self.error(status, f"the step of {digits(h)} s", "" if self.capabilities.variable_step else FIXED)
+        self._states.stepped(t + h)
         if self.driven is not None and self.driven.shown:
             self.driven.set_instant(t + h)
 
@@ -274,6 +288,7 @@ class Fmu:
         status = self.fmi.get_state(state)
         if status > WARNING:
             raise self.error(max(status, ERROR), "saving the state", f"; {FORWARD}")
+        self._states.saved(state)
         return state
 
     def restore(self, state: SavedState) -> None:
@@ -281,9 +296,11 @@ class Fmu:
         status = self.fmi.set_state(state)
         if status > WARNING:
             raise self.error(max(status, ERROR), "restoring the state", f"; {FORWARD}")
+        self._states.restored(state)
 
     def release(self, state: SavedState) -> None:
         """Free a saved state."""
+        self._states.released(state)
         self.fmi.free_state(state)
 
     def close(self) -> None:
@@ -298,14 +315,13 @@ class Fmu:
             self.fmi.free()
 
 
-def _gist(message: str) -> str:
-    """Return the line of a message that says what happened: the first, of a traceback the last; behind the first an exception
-    that a later line names."""
-    lines = [line.strip() for line in message.splitlines() if line.strip()] or [""]
-    if "Traceback" in lines[0]:
-        return lines[-1]
-    named = [line for line in lines[1:] if EXCEPTION.match(line)]
-    return ": ".join([lines[0], *named[-1:]])
+def _continuous(fmu: Fmu, name: str) -> Port:
+    """Return a real variable as a continuous one; `ValueError` where there is none."""
+    if name not in fmu.ports:
+        raise ValueError(f"{fmu.name}: continuous: no variable {name}{nearest(name, fmu.ports)}")
+    if fmu.ports[name].kind != "real":
+        raise ValueError(f"{fmu.name}: continuous: {name} is of type {fmu.ports[name].fmi_type}; only reals can be")
+    return replace(fmu.ports[name], variability="continuous")
 
 
 def _require_possible(fmu: Fmu) -> None:

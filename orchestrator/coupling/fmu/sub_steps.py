@@ -2,7 +2,7 @@
 
 from __future__ import annotations
 
-from collections.abc import Mapping, Sequence
+from collections.abc import Iterable, Mapping, Sequence
 from dataclasses import replace
 from itertools import pairwise
 from pathlib import Path
@@ -20,9 +20,9 @@ from orchestrator.coupling.fmu.instance import Fmu
 WHOLE = 1e-6  # how far a number of steps may be from a whole one
 
 
-def instance(path: str | Path, name: str, steps: int = 1) -> Fmu:
-    """Return an instance of an FMU that makes `steps` steps in each of the master's."""
-    return Fmu(path, name) if steps == 1 else SubStepped(path, name, steps)
+def instance(path: str | Path, name: str, steps: int = 1, continuous: Iterable[str] = ()) -> Fmu:
+    """Return an instance of an FMU that makes `steps` steps in each of the master's; `continuous` as for `Fmu`."""
+    return Fmu(path, name, continuous) if steps == 1 else SubStepped(path, name, steps, continuous)
 
 
 class SubStepped(Fmu):
@@ -48,8 +48,8 @@ class SubStepped(Fmu):
     given : (m,) outputs over the whole step
     """
 
-    def __init__(self, path: str | Path, name: str | None, steps: int):
-        super().__init__(path, name)
+    def __init__(self, path: str | Path, name: str | None, steps: int, continuous: Iterable[str] = ()):
+        super().__init__(path, name, continuous)
         if steps < 1:
             raise ValueError(f"{self.name}: steps = {steps}; at least one is made")
         self.steps, self.length, self.stepped = steps, 0.0, False
@@ -106,7 +106,7 @@ class SubStepped(Fmu):
 
     def twin(self) -> Fmu:
         """Return a second instance with the same parameters, not initialised."""
-        twin = SubStepped(self.path, self.name, self.steps)
+        twin = SubStepped(self.path, self.name, self.steps, self.continuous)
         twin.set_parameters(self.parameters)
         if self.driven is not None:
             twin.follow(self.driven.courses, self.driven.taken)

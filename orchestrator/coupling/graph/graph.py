@@ -19,7 +19,7 @@ from orchestrator.coupling.fmu.instance import Fmu
 from orchestrator.coupling.graph.arrays import Arrays, Node
 from orchestrator.coupling.graph.links import Connection, GraphError, checked_links
 from orchestrator.coupling.graph.loops import AlgebraicLoop
-from orchestrator.coupling.graph.order import Dependencies, dependencies_of, derived_order, levels
+from orchestrator.coupling.graph.order import Dependencies, dependencies_of, derived_order, discrete_loops, levels
 from orchestrator.coupling.graph.supply import follow, require_supplied, unfed
 
 
@@ -73,6 +73,7 @@ class Graph(Arrays):
         _name(components)
         self.connections = tuple(Connection.parse(c) if isinstance(c, str) else c for c in connections)
         links = checked_links(components, self.connections)
+        self.discrete_loops = discrete_loops(links, components)
         require_supplied(components, self.connections)
         follow(components, self.connections, inputs or {})
         self.feedthrough = dependencies_of(components, initial=False)

@@ -58,6 +58,9 @@ class Link:
     offset: float
     discrete: bool
 
+    def __str__(self) -> str:
+        return f"{'.'.join(self.source)} -> {'.'.join(self.target)}"
+
 
 def checked_links(components: Mapping[str, Fmu], connections: Iterable[Connection]) -> list[Link]:
     """Return the connections as links; `GraphError` says which cannot be, why, and what to do."""

@@ -32,6 +32,14 @@ def dependencies_of(components: Mapping[str, Fmu], *, initial: bool) -> Dependen
     return table
 
 
+def discrete_loops(links: Iterable[Link], components: Mapping[str, Fmu]) -> list[str]:
+    """Return the connections of reals in loops that an FMU declares discrete, so that no master iterates over them."""
+    links, rank = list(links), {name: i for i, name in enumerate(components)}
+    label = _strongly_connected([(rank[k.source[0]], rank[k.target[0]]) for k in links], len(rank))
+    held = [k for k in links if k.discrete and label[rank[k.source[0]]] == label[rank[k.target[0]]]]
+    return [str(k) for k in held if all(components[c].ports[v].kind == "real" for c, v in (k.source, k.target))]
+
+
 def _components_of(edges: Iterable[Edge], n: int) -> np.ndarray:
     """Return the number of the strongly connected component of each of `n` vertices, sources before what
     they feed."""

@@ -33,6 +33,7 @@ class Log:
     energy_residual : load → that work less what the component at its other end has booked, accumulated, (n + 1,) J; see
         `Work`
     error : None if the run came to its end
+    ended : which FMU asked for the end before the stop time, and when; empty if none did
     """
 
     master: str
@@ -48,6 +49,7 @@ class Log:
     energy: dict[str, np.ndarray] = field(default_factory=dict)
     energy_residual: dict[str, np.ndarray] = field(default_factory=dict)
     error: FmuError | None = None
+    ended: str = ""
     units: dict[str, str] = field(default_factory=dict)
 
     def signal(self, name: str) -> np.ndarray:

@@ -9,7 +9,7 @@ from time import perf_counter
 import numpy as np
 
 from orchestrator.coupling.errors import digits
-from orchestrator.coupling.fmu.failure import TIMEOUT, FmuError
+from orchestrator.coupling.fmu.failure import TIMEOUT, FmuEnd, FmuError
 from orchestrator.coupling.fmu.instance import ROUNDING, Fmu
 from orchestrator.coupling.fmu.sub_steps import check_steps
 from orchestrator.coupling.graph.graph import Graph
@@ -113,6 +113,8 @@ class _Simulation:
         except FmuError as error:
             if not self.abandoned:
                 self.log.error = error
+        except FmuEnd as end:
+            self.log.ended = str(end)
         except BaseException as error:  # goes on in the caller's thread
             self.failure = error
         finally:
@@ -144,6 +146,9 @@ class _Simulation:
                 log.wall_first, clock = perf_counter() - clock, perf_counter()
                 self.before = {name: (fmu.wall, fmu.solves) for name, fmu in self.graph.components.items()}
             log.wall = perf_counter() - clock
+            for name, fmu in self.graph.components.items():
+                if fmu.fmi.ends:
+                    raise FmuEnd(name, report.time)
 
     def _note(self, report: StepReport) -> None:
         """Write the macro step that has just been made into the log."""
