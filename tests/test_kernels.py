@@ -191,6 +191,12 @@ def test_every_import_is_followed(layout, name):
     assert "layout.main" in jit.sources("layout.main")
 
 
+def test_the_script_that_runs_is_none_of_the_sources(layout):
+    """Some libraries import ``__main__``: what is known by its sources would else be another thing for each script."""
+    (layout / "main.py").write_text("import __main__\nfrom __main__ import something\n", encoding="utf-8")
+    assert set(jit.sources("layout.main")) == {"layout.main"}
+
+
 def test_a_copy_under_another_name_depends_on_itself_alone(layout):
     """As in an FMU, whose sources stand under a name of their own."""
     copy = layout.with_name("fmus_0123456789abcdef")

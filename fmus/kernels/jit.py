@@ -121,7 +121,8 @@ def _remove_former(parent: Path) -> None:
 def sources(module: str) -> dict[str, bytes]:
     """Return the source of `module` and of all that it takes names from, by name of the module; libraries are left out.
 
-    Import statements are followed wherever they stand in a file; a module that is found by other means is not.
+    Import statements are followed wherever they stand in a file; a module that is found by other means is not. Nor is the
+    script that runs, which some libraries look at: what is made of the rest does not hang on who asks.
     """
     found: dict[str, bytes] = {}
     left = [module]
@@ -130,7 +131,8 @@ def sources(module: str) -> dict[str, bytes]:
         path = _file(name)
         if name not in found and path is not None:
             found[name] = _content(path)
-            left += _imported(found[name].decode(errors="replace"), name, path)
+            imported = _imported(found[name].decode(errors="replace"), name, path)
+            left += (one for one in imported if one != "__main__")
     return found
 
 

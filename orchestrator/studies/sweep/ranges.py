@@ -39,7 +39,8 @@ def cell(outcomes: Sequence[Outcome]) -> Cell:
     worst = min(known, key=lambda outcome: outcome.margins[outcome.binding], default=None)
     verdicts = [outcome.safe for outcome in outcomes]
     safe = False if False in verdicts else None if None in verdicts or not verdicts else True
-    verdict: Standing = min((outcome.verdict for outcome in outcomes), key=WORST_FIRST.index, default="none")
+    found: list[Standing] = [outcome.verdict for outcome in outcomes]
+    verdict: Standing = min(found, key=WORST_FIRST.index) if found else "none"
     if worst is None:
         return Cell(np.nan, safe, "", verdict)
     return Cell(worst.margins[worst.binding], safe, worst.binding, verdict)
