@@ -269,7 +269,8 @@ class Fmi1(Fmi2):
     TYPES: ClassVar[dict[str, tuple[str, type]]] = Fmi2.TYPES | {"Boolean": ("Boolean", np.int8)}
 
     def __init__(self, description: ModelDescription, folder: Path, name: str, sink: Sink):
-        self._prefix = f"{description.coSimulation.modelIdentifier}_"
+        interface: Any = description.coSimulation
+        self._prefix = f"{interface.modelIdentifier}_"
         super().__init__(description, folder, name, sink)
         self._do_step = self._raw("fmi2DoStep", c_double, c_double, c_char)
 

@@ -4,6 +4,7 @@ from __future__ import annotations
 
 import csv
 from collections.abc import Iterator, Mapping, Sequence
+from importlib import import_module
 from importlib.util import find_spec
 from pathlib import Path
 from typing import Any
@@ -113,9 +114,7 @@ def write_parquet(path: Path, table: Path) -> None:
     """Write the columns of `table` as Parquet, where pyarrow is there: numbers as such, null where nothing is known."""
     if find_spec("pyarrow") is None:
         return
-    import pyarrow
-    from pyarrow import parquet
-
+    pyarrow, parquet = import_module("pyarrow"), import_module("pyarrow.parquet")
     columns = {
         name: pyarrow.array(values, from_pandas=True)
         if values.dtype == float
