@@ -196,7 +196,7 @@ def run(
             pictures=not no_pictures,
         )
     printing.print_run(done)
-    print(f"results in {done.directory}")
+    print(f"results in {done.directory}{printing.page_of(done.directory)}")
     printing.complain_of([done])
     raise typer.Exit(done.exit_status)
 
@@ -244,7 +244,7 @@ def compare(
         print(f"results so far in {error.directory}")
         raise
     printing.print_comparison(done)
-    pictures = "" if no_pictures else f", pictures in {done.directory}/plots"
+    pictures = "" if no_pictures else f", pictures in {done.directory}/plots{printing.page_of(done.directory)}"
     unsafe = ", but the landing is not (clearly) safe" if done.safe is False else ""
     print(f"verdict: {'pass' if done.passed else 'FAIL'}{unsafe}; results in {done.directory}{pictures}")
     printing.complain_of(done.results)

@@ -7,6 +7,7 @@ from collections.abc import Callable, Iterable, Iterator, Mapping, Sequence
 from contextlib import contextmanager
 from io import TextIOWrapper
 from math import isnan
+from pathlib import Path
 from typing import TYPE_CHECKING, Any
 
 import typer
@@ -56,6 +57,12 @@ def print_run(run: Run) -> None:
     _print_estimates(run)
     if run.energy is not None:
         print(f"energy drift: {run.energy.drift:.2g} J of {run.energy.exchanged:.3g} J exchanged")
+
+
+def page_of(directory: Path | None) -> str:
+    """Return where the page of a run or comparison is, to be added to where its results are; empty where there is none."""
+    page = directory / "report.html" if directory is not None else None
+    return f", page {page}" if page is not None and page.is_file() else ""
 
 
 def print_safety(said: Mapping[str, Any], whose: str = "") -> None:
