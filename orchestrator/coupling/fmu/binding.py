@@ -136,9 +136,9 @@ class Fmi2:
             tail = (seed.ctypes.data, seed.size, out.ctypes.data, out.size)
         return call(unknown.ctypes.data, unknown.size, known.ctypes.data, known.size, *tail)
 
-    def do_step(self, t: float, h: float, forward: bool) -> int:
-        """Advance from `t` to `t + h`; `forward`: no state from before `t` will be restored any more."""
-        return self._do_step(t, h, forward)
+    def do_step(self, t: float, h: float, none_before: bool) -> int:
+        """Advance from `t` to `t + h`; `none_before`: no state from before `t` will be restored any more."""
+        return self._do_step(t, h, none_before)
 
     def asks_for_the_end(self, t: float) -> bool:
         """Return whether a step from `t` that was discarded says that the simulation shall end there."""
@@ -232,10 +232,10 @@ class Fmi3(Fmi2):
         base = self.flags.ctypes.data
         self._out = (base, base + 1, base + 2, self.reached.ctypes.data)
 
-    def do_step(self, t: float, h: float, forward: bool) -> int:
+    def do_step(self, t: float, h: float, none_before: bool) -> int:
         """Advance from `t` to `t + h`; a step cut short counts as discard."""
         self.flags[:], self.reached[0] = False, t + h
-        status = self._do_step(t, h, forward, *self._out)
+        status = self._do_step(t, h, none_before, *self._out)
         if status <= WARNING and self._cut_short(t + h):
             self.sink(DISCARD, f"the FMU stopped at {self.reached[0]:g} s")
             return DISCARD
@@ -289,7 +289,7 @@ class Fmi1(Fmi2):
         """Return a function of the library, whose name begins with that of the model."""
         return super()._raw(self._prefix + function.replace("fmi2", "fmi"), *arguments)
 
-    def do_step(self, t: float, h: float, forward: bool) -> int:
+    def do_step(self, t: float, h: float, none_before: bool) -> int:
         """Advance from `t` to `t + h`; the last step is never repeated."""
         return self._do_step(t, h, b"\x01")
 

@@ -26,6 +26,7 @@ from orchestrator.coupling.fmu.binding import (
     ERROR,
     FATAL,
     LABELS,
+    ROUNDING,
     WARNING,
     SavedState,
     binding_of,
@@ -44,8 +45,6 @@ from orchestrator.coupling.fmu.vocabulary import vocabulary_of
 logging.getLogger("fmus").addHandler(logging.NullHandler())  # what our FMUs say comes through FMI, like that of others
 
 SHORTER = "; a smaller macro step may help"
-ROUNDING = 16 * np.finfo(float).eps
-"""Relative distance to the stop time within which a step is meant to end there."""
 FIXED = "; it cannot vary its step (canHandleVariableCommunicationStepSize is false), take the macro step that it is made for"
 CURES = {DISCARD: SHORTER, NOT_FINITE: SHORTER}
 

@@ -9,8 +9,9 @@ from time import perf_counter
 import numpy as np
 
 from orchestrator.coupling.errors import digits
+from orchestrator.coupling.fmu.binding import ROUNDING
 from orchestrator.coupling.fmu.failure import TIMEOUT, FmuEnd, FmuError
-from orchestrator.coupling.fmu.instance import ROUNDING, Fmu
+from orchestrator.coupling.fmu.instance import Fmu
 from orchestrator.coupling.fmu.sub_steps import check_steps
 from orchestrator.coupling.graph.graph import Graph
 from orchestrator.coupling.masters import made_for
