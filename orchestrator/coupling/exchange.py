@@ -117,6 +117,8 @@ class Load:
 
 LOADS = {"force": Load("position"), "moment": Load("rotation", from_start=True)}
 """By the last part of a variable's name."""
+VELOCITIES = {"position": "velocity", "rotation": "angular_velocity"}
+"""Motions whose rate has a name of its own; that of any other X is ``X_rate``."""
 FROM_START = tuple(load.motion for load in LOADS.values() if load.from_start)
 MOMENTS = ("moment", "torque")
 """Loads that act through a force at the same place and its lever."""
@@ -188,6 +190,12 @@ def motion_of(load: str) -> tuple[str, bool]:
     from the start of the step."""
     place, last, axis = split(load)
     return f"{place}{LOADS[last].motion}{axis}", LOADS[last].from_start
+
+
+def rate_of(motion: str) -> str:
+    """Return the name that the rate of a motion has, ``port[1].velocity.x`` for ``port[1].position.x``."""
+    place, last, axis = split(motion)
+    return f"{place}{VELOCITIES.get(last, last + RATE)}{axis}"
 
 
 def force_beside(moment: str) -> str:

@@ -27,7 +27,7 @@ from orchestrator.runs.systems import System, resolve
 from orchestrator.scenario.types import Scenario
 
 OF_A_STEP = (
-    "time", "iterations", "residual", "subdivisions", "rejected", "columns", "converged", "estimate", "power_residual",
+    "time", "iterations", "residual", "subdivisions", "rejected", "columns", "by_model", "converged", "estimate", "power_residual",
 )  # fmt: skip
 """What is kept of the report of a macro step."""
 Reached = Callable[[float], None]

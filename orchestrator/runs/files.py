@@ -22,7 +22,7 @@ FIELD_UNITS = {
     "time": "s", "arc_length": "m", "position": "m", "tension": "N",
     "node_arc_length": "m", "node_position": "m", "node_slope": "1",
 }  # fmt: skip
-COUNTS = {"iterations": int, "subdivisions": int, "rejected": int, "columns": int, "converged": bool}
+COUNTS = {"iterations": int, "subdivisions": int, "rejected": int, "columns": int, "by_model": bool, "converged": bool}
 """Columns of ``iterations.csv`` that are no real numbers."""
 FMU_LOG = "fmu.log"
 Manifest = dict[str, Any]

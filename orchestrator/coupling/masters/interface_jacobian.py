@@ -4,6 +4,7 @@ are."""
 from __future__ import annotations
 
 from collections.abc import Callable
+from dataclasses import dataclass
 from typing import Any, ClassVar
 
 import numpy as np
@@ -13,13 +14,17 @@ from orchestrator.coupling.fmu.failure import FmuError
 from orchestrator.coupling.graph.graph import Graph, Node
 from orchestrator.coupling.graph.links import GraphError
 from orchestrator.coupling.stepping.bounds import Count, NonNegative, Positive, PositiveCount
+from orchestrator.coupling.stepping.free_response import FreeResponse, Past
 from orchestrator.coupling.stepping.implicit import Implicit
 from orchestrator.coupling.stepping.interpolation import Between, step_node
 from orchestrator.coupling.stepping.jacobian import OwnDerivatives
 from orchestrator.coupling.stepping.least_squares import LeastSquares
+from orchestrator.coupling.stepping.record import Record
 from orchestrator.coupling.stepping.report import StepReport
+from orchestrator.coupling.stepping.step_control import joined
 
 WORST = 1e-2  # contraction of the outer iteration that the exactness of the inner one reckons with at most
+PREDICTIONS = ("model", "polynomial")
 SMALLEST = 1e-5  # relative difference of the unknowns below which it says nothing about the Jacobian
 
 
@@ -48,6 +53,10 @@ class InterfaceJacobian(Implicit):
     inner_iterations : at most
     max_iterations : outer ones before the step is sub-divided; where the linear models fail, halves cost less, and an
         iteration that wanders finds solutions far from where the motion comes from
+    prediction : where iterations begin. ``model``: the interface is solved with the models' free responses, the contacts as
+        they are, before the first step of the expensive components (`FreeResponse`); where the record of that is poorer than
+        the polynomial's, and with ``polynomial`` always, at the loads extrapolated
+    memory : s, how long a load is remembered in a free response; each step of it costs a solve for every unknown, once
     options : those of `Implicit`
     """
 
@@ -68,13 +77,19 @@ class InterfaceJacobian(Implicit):
         inner_tolerance: Positive = 0.1,
         inner_iterations: PositiveCount = 30,
         max_iterations: PositiveCount = 10,
+        prediction: str = "model",
+        memory: NonNegative = 0.02,
         **options: Any,
     ):
         self.inner = LeastSquares(graph.torn.size, reuse, threshold, relaxation)
         super().__init__(graph, self.inner, max_iterations=max_iterations, **options)
         self.difference, self.slow = difference, slow
         self.inner_tolerance, self.inner_iterations = inner_tolerance, inner_iterations
-        self.models = [Model(graph, node, self.between) for node in graph.nodes if not node.forward.size and node.torn]
+        if prediction not in PREDICTIONS:
+            raise ValueError(f"prediction {prediction!r}: choose {', '.join(PREDICTIONS)}")
+        self.foresees = prediction == "model"
+        nodes = [node for node in graph.nodes if not node.forward.size and node.torn]
+        self.models = [Model(graph, node, self.between, FreeResponse(node, memory)) for node in nodes]
         modelled = {model.node.name for model in self.models}
         self.rest = [(i, node) for i, node in enumerate(graph.nodes) if node.name not in modelled]
         if not self.models or not self.rest:
@@ -87,7 +102,110 @@ class InterfaceJacobian(Implicit):
         super().start(t)
         for model in self.models:
             model.jacobians.clear()
+            model.free.reset()
         self.contraction = 0.0
+        self.records: dict[float, Record] = {}
+
+    def step(self, t: float, H: float) -> StepReport:
+        """Advance all components from `t` to `t + H`."""
+        self.pieces = [_Piece(t, 0.0, self.x, [])]
+        return super().step(t, H)
+
+    def _solve(
+        self, t: float, H: float, states: list[SavedState], report: StepReport, *, keep_best: bool
+    ) -> tuple[bool, float]:
+        """Iterate from the nearer of two beginnings: the polynomial through the loads, or the models' free responses."""
+        polynomial = self.predictor.predict(t + H / 2, self.x)
+        foreseen, record = None, self.records.setdefault(H, Record())
+        if self.foresees:
+            for model in self.models:
+                model.free.begin()
+            foreseen = self._foreseen(t, H, polynomial, states) if record.asks else None
+        report.by_model = foreseen is not None and record.models_win
+        before = report.iterations
+        first = foreseen if foreseen is not None and record.models_win else polynomial
+        found = self._iterate(t, H, first, states, self.tolerance, report)
+        if found.converged:
+            self.x = found.x
+            near = None if foreseen is None else self._distance(foreseen)
+            record.note(self._distance(polynomial), near, report.iterations - before)
+        elif keep_best:
+            self._hold(t, H, found.x, states, report)
+        return found.converged, found.residual
+
+    def _distance(self, guess: np.ndarray) -> float:
+        return float(np.linalg.norm((guess - self.x) / self.scale.values))
+
+    def _foreseen(self, t: float, H: float, x: np.ndarray, states: list[SavedState]) -> np.ndarray | None:
+        """Return the unknowns that meet the interface equation with the models' free responses; the rest alone is stepped.
+
+        None where no step of this length is known yet, or no solution is found.
+        """
+        if not all(H in model.jacobians and model.free.known(H) for model in self.models):
+            return None
+        u = self.graph.u.copy()
+        self.between.begin()
+        self._begin(t, H, x, states)
+        for model in self.models:
+            self._measure(model, t, H, x, states)
+            J, own = model.jacobians[H], x[model.unknowns].copy()
+            model.last = own, model.free.foretold(H, J) + J @ own
+        try:
+            r = self._rest_residual(t, H, x, states)
+            found, solved = self._solve_interface(t, H, x, r, self.scale.norm(r, x, H), states)
+        except FmuError as error:
+            if not error.recoverable:
+                raise
+            found, solved = x, False
+        for i, node in self.rest:
+            node.fmu.restore(states[i])
+        self.graph.u[:] = u
+        return found if solved else None
+
+    def _measure(self, model: Model, t: float, H: float, x: np.ndarray, states: list[SavedState]) -> None:
+        """Measure how a component remembers its loads, once for each length of step, where that will pay."""
+        free, node = model.free, model.node
+        lags, stop = free.lags(H), node.fmu.stop
+        if H in free.pulses or not lags or free.known(H) <= lags or t + (lags + 1) * H > stop:
+            return
+        if self.records[H].pays((lags + 1) * (node.torn + 1), (stop - t) / H):
+            values = x[model.unknowns]
+            steps = self.difference * np.maximum(np.abs(values), 1.0)
+            state = states[self.graph.nodes.index(node)]
+            model.jacobians[H] = free.measure(t, H, values, steps, state, self.between)
+
+    def _accept(self, t: float, H: float) -> None:
+        super()._accept(t, H)
+        if self.foresees:
+            past = [Past(m.free.start, m.node.outputs.values.copy(), self.x[m.unknowns].copy()) for m in self.models]
+            self._remember(_Piece(t, H, self.x, past))
+
+    def _remember(self, piece: _Piece) -> None:
+        """Remember a step; two halves of a longer one are remembered as that, too."""
+        for model, past in zip(self.models, piece.past, strict=True):
+            model.free.append(piece.H, past)
+        before = self.pieces[-1]
+        if before.H != piece.H or round((piece.t - self.pieces[0].t) / piece.H) % 2 == 0:
+            self.pieces.append(piece)
+            return
+        self.pieces.pop()
+        x = joined(self.scale, before.x, piece.x, piece.H)
+        past = [
+            m.free.joined(first, second, x[m.unknowns])
+            for m, first, second in zip(self.models, before.past, piece.past, strict=True)
+        ]
+        self._remember(_Piece(before.t, 2.0 * piece.H, x, past))
+
+    def snapshot(self) -> tuple[Any, ...]:
+        """Return all that a step changes, the states of the components first (to be released)."""
+        return (*super().snapshot(), [dict(model.free.past) for model in self.models], list(self.pieces))
+
+    def revert(self, snapshot: tuple[Any, ...]) -> None:
+        """Go back to a snapshot."""
+        super().revert(snapshot[:-2])
+        for model, past in zip(self.models, snapshot[-2], strict=True):
+            model.free.past = dict(past)
+        self.pieces = list(snapshot[-1])
 
     def _begin(self, t: float, H: float, x: np.ndarray, states: list[SavedState]) -> None:
         super()._begin(t, H, x, states)
@@ -198,6 +316,16 @@ class InterfaceJacobian(Implicit):
         return graph.gathered(self.places) - x
 
 
+@dataclass(frozen=True)
+class _Piece:
+    """A step of length `H` (s) from `t` on, made within the macro step: its unknowns (n,), and what each model keeps of it."""
+
+    t: float
+    H: float
+    x: np.ndarray
+    past: list[Past]
+
+
 class Model:
     """Linear model y(x) of one component over a step, about the last point where it was stepped.
 
@@ -206,11 +334,12 @@ class Model:
     unknowns : (m,) places of the component's inputs among the unknowns
     derivatives : what the FMU says of its Jacobian
     jacobians : length of step → (n_outputs, m)
-    last : unknowns (m,) and outputs (n_outputs,) of the last step made
+    last : unknowns (m,) and outputs (n_outputs,) of the last step made, or foretold
+    free : what foretells them
     """
 
-    def __init__(self, graph: Graph, node: Node, between: Between):
-        self.node = node
+    def __init__(self, graph: Graph, node: Node, between: Between, free: FreeResponse):
+        self.node, self.free = node, free
         self.derivatives = OwnDerivatives(graph, between, node)
         first = int(np.searchsorted(graph.torn, node.first))
         self.unknowns = slice(first, first + node.torn)

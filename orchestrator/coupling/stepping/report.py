@@ -18,6 +18,7 @@ class StepReport:
     subdivisions : sub-steps beyond the first
     rejected : sub-steps rolled back, because they did not converge or their error was too large
     columns : least-squares columns kept, 0 where there are none
+    by_model : whether the iteration began from the models' free responses (of sub-steps, the last)
     converged : False if any part of it did not reach the tolerance
     estimate : a-posteriori error estimate, nan where none is made
     power_residual : W, largest difference of the powers on both sides of an interface, nan where none is booked
@@ -29,6 +30,7 @@ class StepReport:
     subdivisions: int = 0
     rejected: int = 0
     columns: int = 0
+    by_model: bool = False
     converged: bool = True
     estimate: float = nan
     power_residual: float = nan
