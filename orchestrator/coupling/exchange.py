@@ -192,6 +192,13 @@ def motion_of(load: str) -> tuple[str, bool]:
     return f"{place}{LOADS[last].motion}{axis}", LOADS[last].from_start
 
 
+def tangent_of(moment: str) -> str:
+    """Return the tangent that a moment turns where no rotation is shown, ``port[1].tangent.x`` for ``port[1].moment.x``; empty
+    for any other load."""
+    place, last, axis = split(moment)
+    return f"{place}tangent{axis}" if last == "moment" else ""
+
+
 def rate_of(motion: str) -> str:
     """Return the name that the rate of a motion has, ``port[1].velocity.x`` for ``port[1].position.x``."""
     place, last, axis = split(motion)

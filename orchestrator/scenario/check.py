@@ -15,7 +15,7 @@ from orchestrator.catalogue import modules as vocabulary
 from orchestrator.catalogue.documents import Document, table_of
 from orchestrator.catalogue.quantities import Complaint, Scalar
 from orchestrator.coupling.errors import InputError, digits, nearest
-from orchestrator.coupling.masters.options import master_options, out_of_bounds
+from orchestrator.coupling.masters.options import master_options, out_of_bounds, takes
 from orchestrator.scenario.over_time import OverTime, problems_of
 from orchestrator.scenario.types import DEFAULT_MASTER, UNITS, Provenance
 
@@ -152,7 +152,7 @@ def _master_problems(document: Document) -> Iterator[Complaint]:
     for key, value in options.items() if isinstance(name, str) and name in masters else ():
         if key not in masters[name]:
             yield Complaint(f"master.{key}", f"unknown key for master {name}{nearest(key, masters[name])}")
-        elif not _is_like(value, masters[name][key]):
+        elif not (_is_like(value, masters[name][key]) or takes(name, key, value)):
             yield Complaint(f"master.{key}", f"{value!r} is not of type {type(masters[name][key]).__name__}")
         elif _is_number(value) and (wanted := out_of_bounds(name, key, value)):
             yield Complaint(f"master.{key}", f"{value!r} must be {wanted}")

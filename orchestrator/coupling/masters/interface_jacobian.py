@@ -57,6 +57,8 @@ class InterfaceJacobian(Implicit):
         they are, before the first step of the expensive components (`FreeResponse`); where the record of that is poorer than
         the polynomial's, and with ``polynomial`` always, at the loads extrapolated
     memory : s, how long a load is remembered in a free response; each step of it costs a solve for every unknown, once
+    tolerance : largest relative residual of a converged step; where iterations begin so near to their end, the error that it
+        leaves is that of the exchange or less
     options : those of `Implicit`
     """
 
@@ -79,10 +81,11 @@ class InterfaceJacobian(Implicit):
         max_iterations: PositiveCount = 10,
         prediction: str = "model",
         memory: NonNegative = 0.02,
+        tolerance: Positive = 3e-6,
         **options: Any,
     ):
         self.inner = LeastSquares(graph.torn.size, reuse, threshold, relaxation)
-        super().__init__(graph, self.inner, max_iterations=max_iterations, **options)
+        super().__init__(graph, self.inner, max_iterations=max_iterations, tolerance=tolerance, **options)
         self.difference, self.slow = difference, slow
         self.inner_tolerance, self.inner_iterations = inner_tolerance, inner_iterations
         if prediction not in PREDICTIONS:
@@ -120,21 +123,15 @@ class InterfaceJacobian(Implicit):
         if self.foresees:
             for model in self.models:
                 model.free.begin()
-            foreseen = self._foreseen(t, H, polynomial, states) if record.asks else None
-        report.by_model = foreseen is not None and record.models_win
-        before = report.iterations
-        first = foreseen if foreseen is not None and record.models_win else polynomial
-        found = self._iterate(t, H, first, states, self.tolerance, report)
+            foreseen = self._foreseen(t, H, polynomial, states) if record.asks_models else None
+        report.by_model, before = foreseen is not None, report.iterations
+        found = self._iterate(t, H, polynomial if foreseen is None else foreseen, states, self.tolerance, report)
+        record.note(by_model=report.by_model, residual=self.first_residual, iterations=report.iterations - before)
         if found.converged:
             self.x = found.x
-            near = None if foreseen is None else self._distance(foreseen)
-            record.note(self._distance(polynomial), near, report.iterations - before)
         elif keep_best:
             self._hold(t, H, found.x, states, report)
         return found.converged, found.residual
-
-    def _distance(self, guess: np.ndarray) -> float:
-        return float(np.linalg.norm((guess - self.x) / self.scale.values))
 
     def _foreseen(self, t: float, H: float, x: np.ndarray, states: list[SavedState]) -> np.ndarray | None:
         """Return the unknowns that meet the interface equation with the models' free responses; the rest alone is stepped.
@@ -285,7 +282,8 @@ class InterfaceJacobian(Implicit):
         inner, best = self.inner, (np.inf, x)
         inner.begin(H, self.scale.values)
         # the models leave about `contraction` of the residual: to solve more exactly than they are is of no use
-        target = self.inner_tolerance * max(self.tolerance, self.contraction * residual)
+        # (where the energy asks for more than the tolerance, the residual is below that already)
+        target = self.inner_tolerance * max(min(self.tolerance, residual), self.contraction * residual)
         for _ in range(self.inner_iterations):
             if residual < best[0]:
                 best = (residual, x + r)

@@ -6,7 +6,7 @@ import operator
 from collections.abc import Iterator
 from functools import cache
 from inspect import signature
-from typing import Any, get_type_hints
+from typing import Any, get_args, get_type_hints
 
 from annotated_types import Ge, Gt, Le, Lt
 
@@ -34,6 +34,18 @@ def out_of_bounds(master: str, option: str, value: float) -> str:
         if hint is not None:
             return " and ".join(_broken(getattr(hint, "__metadata__", ()), value))
     return ""
+
+
+def takes(master: str, option: str, value: Any) -> bool:
+    """Return whether `value` is of a type that the option is declared with, beside that of its default."""
+    from orchestrator.coupling.masters import MASTERS
+
+    for init in _initializers(MASTERS[master]):
+        hint = get_type_hints(init).get(option)
+        if hint is not None:
+            wanted = get_args(hint) or (hint,)
+            return not isinstance(value, bool) and isinstance(value, (*wanted, int) if float in wanted else wanted)
+    return False
 
 
 def _broken(bounds: tuple[Any, ...], value: float) -> Iterator[str]:

@@ -16,7 +16,6 @@ from orchestrator.coupling.fmu.sub_steps import check_steps
 from orchestrator.coupling.graph.graph import Graph
 from orchestrator.coupling.masters import made_for
 from orchestrator.coupling.run.log import Log, Recorder
-from orchestrator.coupling.run.work import Work
 from orchestrator.coupling.stepping.master import Master
 from orchestrator.coupling.stepping.report import StepReport
 
@@ -101,7 +100,7 @@ class _Simulation:
         self.graph, self.master, self.recorder, self.log, self.on_step = graph, master, recorder, log, on_step
         self.rows, self.abandoned = 0, False
         self.failure: BaseException | None = None
-        self.work = Work(graph)
+        self.work = master.work
         self.energy = np.zeros((log.time.size, len(self.work.names)))
         self.residual = np.zeros_like(self.energy)
         self.before = {name: (0.0, 0) for name in graph.components}  # wall and solves of the first macro step
@@ -120,15 +119,12 @@ class _Simulation:
             self.failure = error
         finally:
             self.master.finish()
-            if self.work.names and self.work in self.graph.observers:
-                self.graph.observers.remove(self.work)
 
     def _initialize(self, start: float, stop: float) -> None:
         self.graph.initialize(start, stop)
+        self.master.keep_books()
         self.master.start(start)
         if self.work.names:
-            self.work.start()
-            self.graph.observers.append(self.work)
             self.residual[0] = self.work.residual
         self.recorder.read(self.log.values[0], start)
         self.rows = 1

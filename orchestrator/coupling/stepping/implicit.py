@@ -9,7 +9,7 @@ each.
 from __future__ import annotations
 
 from collections.abc import Callable
-from dataclasses import dataclass, replace
+from dataclasses import dataclass
 from typing import Any, ClassVar
 
 import numpy as np
@@ -21,6 +21,7 @@ from orchestrator.coupling.graph.graph import Graph, Node
 from orchestrator.coupling.graph.links import GraphError
 from orchestrator.coupling.stepping.accelerator import Accelerator
 from orchestrator.coupling.stepping.bounds import Count, NonNegative, Positive, PositiveCount
+from orchestrator.coupling.stepping.energy import EnergyAccount
 from orchestrator.coupling.stepping.interpolation import Between, Loads, step_node
 from orchestrator.coupling.stepping.master import Master, require_rollback
 from orchestrator.coupling.stepping.predictor import Predictor
@@ -59,6 +60,8 @@ class Implicit(Master):
     max_depth : the macro step is halved at most so often
     predictor : order of the prediction of the unknowns, or -1: the one that did best lately
     local_tolerance : if positive, sub-steps are made as short as this local error asks for (see `StepControl`)
+    energy_budget : energy that the coupling may make: ``dissipated``, what the components that give the loads have dissipated
+        by then (nothing, where they do not show it); ``0``; ``none``, as much as the tolerance lets pass (`EnergyAccount`)
     parallel : components that need nothing of one another in threads: ``auto`` (where it pays), ``always`` or ``never``
     """
 
@@ -76,6 +79,7 @@ class Implicit(Master):
         max_depth: Count = 6,
         predictor: int = -1,
         local_tolerance: NonNegative = 0.0,
+        energy_budget: str | float = "dissipated",
         parallel: str = "auto",
     ):
         super().__init__(graph, parallel=parallel)
@@ -86,6 +90,7 @@ class Implicit(Master):
         self.between = Between(graph, self.loads, torn=True)
         self.predictor = Predictor(predictor)
         self.scale = Scale(graph, self.loads, absolute, lever)
+        self.account = EnergyAccount(graph, self.work, energy_budget)
         self.places = graph.torn
         if local_tolerance > 0.0:
             self._require_variable_steps()
@@ -93,6 +98,7 @@ class Implicit(Master):
 
     def start(self, t: float) -> None:
         """Prepare for the first step."""
+        self.keep_books()  # the budget of energy needs them
         self.accelerator.reset()
         self.predictor.reset()
         self.scale.reset()
@@ -248,17 +254,23 @@ class Implicit(Master):
         report: StepReport,
         least: int,
     ) -> Iterate:
-        """Step, compare, correct, roll back, until the residual is small enough, nothing moves or it runs away."""
-        best, limit = Iterate(x), np.abs(x)
+        """Step, compare, correct, roll back, until the residual is small enough, nothing moves or it runs away.
+
+        Where after all iterations only the energy that the step makes is too large, it is taken as it is: the books say so.
+        """
+        best, limit, last = Iterate(x), np.abs(x), Iterate(x)
+        self.first_residual = np.inf
         for k in range(self.max_iterations):
             r = self._residual(t, H, x, states if k else None, report)
             if r is None:
                 return best
             residual = self.scale.norm(r, x, H)
+            self.first_residual = residual if not k else self.first_residual
             if residual < best.residual:
                 best = Iterate(x, residual)
-            if residual <= tolerance and k + 1 >= least:
-                return replace(best, converged=True)
+            last = Iterate(x, residual, converged=residual <= tolerance and k + 1 >= least)
+            if last.converged and (least > 1 or self.account.allows(H)):
+                return last
             scale = self.scale.values.copy()  # that of x: the correction may try wild unknowns
             if not k:
                 limit = DIVERGED * np.maximum(scale, np.abs(x))
@@ -267,8 +279,8 @@ class Implicit(Master):
                 return Iterate(x, residual, converged=True) if residual <= NOISE else best
             x = following
             if not np.all(np.abs(x) <= limit):
-                return best
-        return best
+                break
+        return last if last.converged else best
 
     def _begin(self, t: float, H: float, x: np.ndarray, states: list[SavedState]) -> None:
         """Prepare for the iteration of a step that starts at the unknowns `x`."""

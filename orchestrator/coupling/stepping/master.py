@@ -9,6 +9,7 @@ from orchestrator.coupling.graph.graph import Graph
 from orchestrator.coupling.graph.links import GraphError
 from orchestrator.coupling.stepping.parallel import Crew
 from orchestrator.coupling.stepping.report import StepReport
+from orchestrator.coupling.stepping.work import Work
 
 
 class Master:
@@ -19,6 +20,7 @@ class Master:
     NAME : key in `MASTERS`
     TITLE : one line
     IMPLICIT : True if steps are repeated, so that every FMU needs rollback
+    work : books the work through the interfaces, from the start to the end of a run
     crew : makes the rounds over the components, in threads where it pays
     """
 
@@ -28,17 +30,26 @@ class Master:
 
     def __init__(self, graph: Graph, *, parallel: str = "never", sequential: bool = True):
         self.graph = graph
+        self.work = Work(graph)
         self.crew = Crew(graph, parallel, sequential=sequential)
 
     def start(self, t: float) -> None:
         """Prepare for the first step, after `graph.initialize`."""
+
+    def keep_books(self) -> None:
+        """Begin to book the work through the interfaces, unless that is done already."""
+        if self.work.names and self.work not in self.graph.observers:
+            self.work.start()
+            self.graph.observers.append(self.work)
 
     def step(self, t: float, H: float) -> StepReport:
         """Advance all components from `t` to `t + H`."""
         raise NotImplementedError
 
     def finish(self) -> None:
-        """The run has ended, well or not: end its threads."""
+        """The run has ended, well or not: end its threads and its books."""
+        if self.work in self.graph.observers:
+            self.graph.observers.remove(self.work)
         self.crew.close()
 
 

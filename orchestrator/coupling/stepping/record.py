@@ -1,4 +1,4 @@
-"""Which of two beginnings of an iteration has been nearer to what was found: that of models, or that of the polynomial.
+"""Which of two beginnings of an iteration leaves the smaller residual: that of models, or that of the polynomial.
 
 Hard impacts and long steps are the polynomial's; wherever a free response is smooth, the models are far ahead.
 """
@@ -10,9 +10,10 @@ from dataclasses import dataclass
 import numpy as np
 
 FORGET = 0.8  # weight of the past, as in the record of the polynomial's orders
-PROBE = 8  # steps after which the models are asked again where they had lost; twice as many each time they lose again
-NEARER = 0.5  # of the polynomial's distance: an iteration ends sooner where its beginning is much nearer, not a little
-PAYS = 8.0  # what costs solves is done where it may save so many times as many
+PROBE = 8  # steps after which the models are tried again where they had lost; twice as many each time they lose again
+WORTH = 0.5  # digits by which the models must be better: an iteration ends no sooner for less
+PAYS = 5.0  # what costs solves is done where it may save so many times as many
+LEAST, LARGEST = 1e-15, 1e3  # residuals between which digits count
 
 
 @dataclass
@@ -21,37 +22,38 @@ class Record:
 
     Attributes
     ----------
-    model, polynomial : distances of the guesses to what was found, the past fading
+    model, polynomial : digits of the residuals that iterations began with, the past fading; nan: not tried yet
     steps, iterations : steps made, and how many iterations they need, the past fading
-    pause, asked : steps until the models are asked again, and the step when they were
+    pause, tried : steps until the models are tried again, and the step when they were
     """
 
-    model: float = np.inf
-    polynomial: float = 0.0
+    model: float = np.nan
+    polynomial: float = np.nan
     steps: int = 0
     iterations: float = 1.0
     pause: int = PROBE
-    asked: int = 0
+    tried: int = 0
 
     @property
     def models_win(self) -> bool:
-        """Whether the models were nearer lately."""
-        return self.model < NEARER * self.polynomial
+        """Whether the models were better lately."""
+        return self.model < self.polynomial - WORTH
 
     @property
-    def asks(self) -> bool:
-        """Whether the models shall be asked in the next step."""
-        return self.models_win or np.isinf(self.model) or self.steps >= self.asked + self.pause
+    def asks_models(self) -> bool:
+        """Whether the next step shall begin from the models."""
+        return np.isnan(self.model) or self.models_win or self.steps >= self.tried + self.pause
 
-    def note(self, polynomial: float, model: float | None, iterations: int) -> None:
-        """Remember the distances in a step that converged; None where the models were not asked."""
+    def note(self, *, by_model: bool, residual: float, iterations: int) -> None:
+        """Remember the residual that a step began with, and the iterations it took."""
         self.steps += 1
         self.iterations = FORGET * self.iterations + (1.0 - FORGET) * iterations
-        if model is not None:
-            self.asked, self.pause = self.steps, PROBE if self.models_win else 2 * self.pause
-            past = 0.0 if np.isinf(self.model) else FORGET
-            self.model = (past * self.model if past else 0.0) + (1.0 - past) * model
-            self.polynomial = past * self.polynomial + (1.0 - past) * polynomial
+        digits = float(np.log10(np.clip(residual, LEAST, LARGEST)))
+        if not by_model:
+            self.polynomial = _faded(self.polynomial, digits)
+            return
+        self.model = _faded(self.model, digits)
+        self.tried, self.pause = self.steps, PROBE if self.models_win else 2 * self.pause
 
     def pays(self, cost: float, remaining: float) -> bool:
         """Return whether `cost` solves are worth while: as many could have been saved so far, and many times as many will be.
@@ -60,3 +62,7 @@ class Record:
         """
         saved = self.iterations - 1.0
         return self.models_win and self.steps * saved >= cost and not remaining * saved < PAYS * cost
+
+
+def _faded(past: float, value: float) -> float:
+    return value if np.isnan(past) else FORGET * past + (1.0 - FORGET) * value

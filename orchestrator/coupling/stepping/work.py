@@ -2,7 +2,8 @@
 
 Where a component has a load as input, ``X.force``, and its motion as output, ``X.position`` (`LOADS`), the force that acts in
 a step is F + Ḟ (tau - t - H/2), so that its work is F·Δx + Ḟ·(H/2 (x0 + x1) - H x̄), with x̄ the time mean
-``X.position_mean``; without it the second term is left out. A rotation is counted from the start of the step: x0 = 0.
+``X.position_mean``; without it the second term is left out. A rotation is counted from the start of the step: x0 = 0. Where a
+component with a moment shows a tangent in the place of a rotation, as a cable does, it is the rotation of that tangent.
 
 The component that gives the load books the same work with what it knows: the load it has computed in the step and the
 motion it was told. The difference is the energy that the coupling makes; divided by the step it is the power residual
@@ -17,9 +18,11 @@ from typing import Any
 
 import numpy as np
 
-from orchestrator.coupling.exchange import LOADS, MEAN, RATE, motion_of, split, suffixed
+from orchestrator.coupling.exchange import LOADS, MEAN, RATE, motion_of, split, suffixed, tangent_of
 from orchestrator.coupling.fmu.group import Group
 from orchestrator.coupling.graph.graph import Graph, Node
+
+TINY = np.finfo(float).tiny
 
 
 @dataclass
@@ -28,16 +31,19 @@ class _Giver:
 
     Attributes
     ----------
+    name : of the component
     motion, mean : (m,) places in Graph.u where it is told motion and mean; `mean` may be empty
     rates : (m,) places in Graph.u of the slopes that it gives; empty: its load is that of an instant, linear between
-    from_start : whether the motion is counted from the start of the step
+    from_start, turned : whether the motion is counted from the start of the step; whether it is a tangent that turns
     load, before : (m,) at the start of the step
     """
 
+    name: str
     motion: np.ndarray
     mean: np.ndarray
     rates: np.ndarray
     from_start: bool
+    turned: bool
     load: np.ndarray
     before: np.ndarray
 
@@ -48,17 +54,18 @@ class _Giver:
 
     def work(self, graph: Graph, loads: np.ndarray, H: float) -> float:
         """Return the work that it says it has done on the receiver in this step, J."""
-        given, x0, x1 = graph.gathered(loads), self.before, graph.acted[self.motion]
+        given, shown = graph.gathered(loads), graph.acted[self.motion]
+        x0, x1 = _moved(self.before, shown, self.turned)
         if not self.rates.size:
             total = 0.5 * (given + self.load).dot(x1 - x0)
         else:
             total = given.dot(x1 - x0)
             if self.mean.size:
-                slope, mean = graph.gathered(self.rates), graph.acted[self.mean]
+                slope, mean = graph.gathered(self.rates), _moved(self.before, graph.acted[self.mean], self.turned)[1]
                 total += slope.dot(H / 2 * (x0 + x1) - H * mean)
         self.load = given
         if not self.from_start:
-            self.before = x1
+            self.before = shown
         return float(total)
 
 
@@ -73,6 +80,7 @@ class _Interface:
     motion: Group
     mean: Group | None
     from_start: bool  # whether the motion is counted from the start of the step
+    turned: bool  # whether it is a tangent that turns
     before: np.ndarray  # (m,) the motion at the start of the step
     giver: _Giver | None  # None where the source of the load is not told the motion
 
@@ -80,13 +88,14 @@ class _Interface:
         """Return the work of the step that has just been made, J."""
         self.motion.get()
         u, slopes = graph.acted, graph.r if self.own else graph.acted
-        x1, x0 = self.motion.values, self.before
+        x0, x1 = _moved(self.before, self.motion.values, self.turned)
         total = u.take(self.loads).dot(x1 - x0)
         if self.mean is not None and self.rates.size:
             self.mean.get()
-            total += slopes.take(self.rates).dot(H / 2 * (x0 + x1) - H * self.mean.values)
+            mean = _moved(self.before, self.mean.values, self.turned)[1]
+            total += slopes.take(self.rates).dot(H / 2 * (x0 + x1) - H * mean)
         if not self.from_start:
-            self.before = x1.copy()
+            self.before = self.motion.values.copy()
         return total
 
     def remembered(self) -> tuple[np.ndarray, ...]:
@@ -141,6 +150,24 @@ class Work:
         for interface, values in zip(self.interfaces, remembered, strict=True):
             interface.remember(values)
 
+    @property
+    def made(self) -> float:
+        """Energy that all booked interfaces have made since `start`, J."""
+        return float(np.nansum(self.residual))
+
+    @property
+    def givers(self) -> list[str]:
+        """The components that give loads and are told the motion, so that what is made can be told."""
+        return list(dict.fromkeys(i.giver.name for i in self.interfaces if i.giver is not None))
+
+    def tried(self, H: float) -> float:
+        """Return the energy that all booked interfaces will have made if the step just made is accepted, J."""
+        saved = self.save()
+        self(0.0, H)
+        made = self.made
+        self.restore(saved)
+        return made
+
     def __call__(self, t: float, h: float) -> None:
         """Book the step from `t` to `t + h`."""
         for i, interface in enumerate(self.interfaces):
@@ -160,8 +187,30 @@ def _interfaces(graph: Graph, node: Node) -> Iterator[_Interface]:
     for stem, names in found.items():
         pairs = [motion_of(name) for name in names]
         motions, from_start = [motion for motion, _ in pairs], pairs[0][1]
-        if all(motion in node.fmu.ports and node.fmu.ports[motion].causality == "output" for motion in motions):
-            yield _interface(graph, node, stem, _Names(names, motions), from_start)
+        tangents = [tangent_of(name) for name in names]
+        if _all_shown(node, motions):
+            yield _interface(graph, node, stem, _Names(names, motions), from_start, turned=False)
+        elif len(names) == 3 and all(tangents) and _all_shown(node, tangents):
+            yield _interface(graph, node, stem, _Names(names, tangents), from_start=False, turned=True)
+
+
+def _all_shown(node: Node, names: list[str]) -> bool:
+    ports = node.fmu.ports
+    return all(name in ports and ports[name].causality == "output" for name in names)
+
+
+def _moved(before: np.ndarray, shown: np.ndarray, turned: bool) -> tuple[np.ndarray, np.ndarray]:
+    """Return what a load does work on, at the start and as it is `shown`; of a tangent that has `turned`: its rotation.
+
+    The rotation vector from g to h is the angle between them about g × h.
+    """
+    if not turned:
+        return before, shown
+    sizes = float(np.sqrt(before.dot(before) * shown.dot(shown)))
+    axis = np.cross(before, shown) / max(sizes, TINY)
+    sine = float(np.sqrt(axis.dot(axis)))
+    angle = float(np.arctan2(sine, before.dot(shown) / max(sizes, TINY)))
+    return np.zeros(3), axis * (angle / sine if sine > 0.0 else 1.0)
 
 
 @dataclass(frozen=True)
@@ -180,7 +229,7 @@ class _Names:
         return [suffixed(name, MEAN) for name in self.motions]
 
 
-def _interface(graph: Graph, node: Node, stem: str, names: _Names, from_start: bool) -> _Interface:
+def _interface(graph: Graph, node: Node, stem: str, names: _Names, from_start: bool, *, turned: bool) -> _Interface:
     fed = {name: node.first + i for i, name in enumerate(node.inputs.names)}
     free = {name: i for i, (part, name) in enumerate(graph.free_rates) if part == node.name}
     by_master = all(name in free for name in names.rates)
@@ -194,13 +243,14 @@ def _interface(graph: Graph, node: Node, stem: str, names: _Names, from_start: b
         node.fmu.group(names.motions),
         node.fmu.group(names.means) if all(name in node.fmu.ports for name in names.means) else None,
         from_start,
+        turned,
         np.zeros(loads.size),
-        _giver(graph, node, names, loads, rates, from_start),
+        _giver(graph, node, names, loads, rates, from_start, turned),
     )
 
 
 def _giver(
-    graph: Graph, node: Node, names: _Names, loads: np.ndarray, rates: np.ndarray, from_start: bool
+    graph: Graph, node: Node, names: _Names, loads: np.ndarray, rates: np.ndarray, from_start: bool, turned: bool
 ) -> _Giver | None:
     """Return the other side: one component that gives all of the load and is told all of the motion, or None."""
     givers = {graph.links[i].source[0] for i in loads}
@@ -214,7 +264,9 @@ def _giver(
     if motion.size < loads.size:
         return None
     zero = np.zeros(loads.size)
-    return _Giver(motion, _whole(mean, loads.size), _whole(rates, loads.size), from_start, zero, zero)
+    return _Giver(
+        next(iter(givers)), motion, _whole(mean, loads.size), _whole(rates, loads.size), from_start, turned, zero, zero
+    )
 
 
 def _whole(places: np.ndarray, m: int) -> np.ndarray:

@@ -1,0 +1,76 @@
+"""The budget of the energy that a coupling makes: kept at any tolerance, and what it costs."""
+
+from __future__ import annotations
+
+import numpy as np
+import pytest
+
+from orchestrator.api import load_scenario
+from orchestrator.coupling.errors import InputError
+from orchestrator.coupling.stepping.energy import DISSIPATED
+from orchestrator.runs.coupled import Coupled, run_coupled
+
+UNDAMPED = "landing_200m_point9_undamped"
+ROUND_OFF = 1e-12
+"""Of the energy exchanged: what the books cannot tell from nothing."""
+
+
+def _run(scenario: str, stop: float, tolerance: float, budget: str | float, **changes: object) -> Coupled:
+    settings = {"master.tolerance": tolerance, "master.energy_budget": budget} | changes
+    return run_coupled(load_scenario(scenario, stop=stop, set=settings))
+
+
+def _made(run: Coupled) -> np.ndarray:
+    """Energy that all interfaces have made up to each communication point, J."""
+    residuals = list(run.log.energy_residual.values())
+    assert len(residuals) == 4  # force and moment on the line and on the robot: none is left out
+    return np.sum(residuals, axis=0)
+
+
+def _exchanged(run: Coupled) -> float:
+    assert run.energy is not None
+    return run.energy.exchanged
+
+
+@pytest.mark.parametrize("tolerance", [1e-8, 1e-4, 1e-2])
+@pytest.mark.parametrize("scenario", [UNDAMPED, "drop_5cm"])
+def test_nothing_is_made_where_nothing_is_allowed(scenario: str, tolerance: float):
+    """Expected: the sum is never above zero, at any communication point (`EnergyAccount`); the undamped line would keep what
+    is made for ever, the drop has hard impacts."""
+    run = _run(scenario, 0.4, tolerance, 0)
+    assert np.max(_made(run)) <= ROUND_OFF * _exchanged(run)
+
+
+def test_no_more_is_made_than_the_contact_has_dissipated():
+    run = _run(UNDAMPED, 0.4, 1e-2, "dissipated")
+    made, dissipated = _made(run), run.table[f"contact1.{DISSIPATED}"]
+    assert np.all(made <= dissipated + ROUND_OFF * _exchanged(run))
+
+
+def test_without_a_budget_a_loose_tolerance_makes_energy():
+    """What the budget is for: at a tolerance of 1e-2 the residuals alone let 3e-5 of the energy exchanged pass, and more."""
+    run = _run(UNDAMPED, 1.0, 1e-2, "none", **{"master.prediction": "polynomial"})
+    assert np.max(_made(run)) > 1e-6 * _exchanged(run)
+
+
+@pytest.mark.parametrize("master", ["iqn_ils", "anderson", "aitken", "fixed_point"])
+def test_every_implicit_master_keeps_it(master: str):
+    run = _run("rig_10m", 0.1, 1e-3, 0, **{"simulation.master": master, "simulation.macro_step": 0.0005})
+    assert np.max(_made(run)) <= ROUND_OFF * _exchanged(run)
+
+
+@pytest.mark.slow
+@pytest.mark.parametrize("tolerance", [1e-8, 1e-6, 1e-5, 1e-4, 1e-3, 1e-2])
+@pytest.mark.parametrize("budget", ["dissipated", 0])
+def test_a_minute_on_an_undamped_line(tolerance: float, budget: str | float):
+    run = _run(UNDAMPED, 60.0, tolerance, budget)
+    made, allowed = _made(run), run.table[f"contact1.{DISSIPATED}"] if budget else 0.0
+    assert np.all(made <= allowed + ROUND_OFF * _exchanged(run))
+    assert run.log.error is None
+
+
+def test_budgets_that_do_not_exist():
+    with pytest.raises(InputError, match="energy_budget 'much': choose dissipated, none or 0"):
+        _run(UNDAMPED, 0.01, 1e-6, "much")
+    with pytest.raises(InputError, match="energy_budget 3"):
+        _run(UNDAMPED, 0.01, 1e-6, 3.0)
