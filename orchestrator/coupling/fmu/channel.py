@@ -14,7 +14,7 @@ import mmap
 import os
 import select
 import tempfile
-from collections.abc import Callable, Iterator
+from collections.abc import Callable
 from struct import Struct
 from time import perf_counter
 from typing import Any
@@ -24,8 +24,8 @@ HEADER = Struct("=iiqdd")
 DEFINE, SET, GET, PEEK, STEP, SAVE, RESTORE, FORGET, CALL = range(9)
 """What is done. PEEK is a GET that nobody has asked for yet: it spoils nothing if it fails."""
 WORD, TOOK, START = Struct("=q"), Struct("=d"), 64
-"""Places in the shared memory: 0, the number of the record that is being carried out; 8, s that the last step took; `START`, the
-first record."""
+"""Places in the shared memory: 0, the number of the record that is being carried out; 8, s that the last step took; `START`,
+the first record."""
 FINE, ENDS = b".", b"e"
 """All went well; and the FMU asks for the end of the simulation."""
 MESSAGE, PEEKED, RESULT = b"M", b"P", b"R"
@@ -64,23 +64,24 @@ def frame(kind: bytes, content: Any) -> bytes:
     return FRAME.pack(kind, len(text)) + text
 
 
-def frames(data: bytes) -> Iterator[tuple[bytes, bytes, int]]:
-    """Yield kind, content and end of each whole frame in `data`."""
-    place = 0
-    while place < len(data):
-        if data[place : place + 1] in (FINE, ENDS):
-            place += 1
-            yield data[place - 1 : place], b"", place
+def parted(data: bytes) -> tuple[list[tuple[bytes, bytes]], bytes]:
+    """Return kind and content of each whole frame in `data`, and what is left; `Ended` where it has no sense."""
+    found: list[tuple[bytes, bytes]] = []
+    while data:
+        if data[:1] in (FINE, ENDS):
+            found.append((data[:1], b""))
+            data = data[1:]
             continue
-        if len(data) - place < FRAME.size:
-            return
-        kind, length = FRAME.unpack_from(data, place)
+        if len(data) < FRAME.size:
+            break
+        kind, length = FRAME.unpack_from(data)
         if kind not in (MESSAGE, PEEKED, RESULT):
             raise Ended
-        if len(data) < place + FRAME.size + length:
-            return
-        place += FRAME.size + length
-        yield kind, data[place - length : place], place
+        if len(data) < FRAME.size + length:
+            break
+        found.append((kind, data[FRAME.size : FRAME.size + length]))
+        data = data[FRAME.size + length :]
+    return found, data
 
 
 class Channel:
