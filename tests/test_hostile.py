@@ -113,7 +113,9 @@ FILES = [
 def test_an_fmu_that_cannot_be_used_is_refused_by_name(loop, orchestrate, tmp_path, how, message):
     path = packed(tmp_path / "a + b #1 ü.fmu", *how.get("changes", []), binary=how.get("binary", True))
     more = how.get("more", "")
-    loop.write_text(LOOP.format(path.name).replace("[components.q]", f"{more}\n[components.q]\n{more}"), encoding="utf-8")
+    loop.write_text(
+        LOOP.format(path.name).replace("[components.q]", f"{more}\n[components.q]\n{more}"), encoding="utf-8"
+    )
     status, said = orchestrate("validate", loop)
     assert status == 2 and message in said
 

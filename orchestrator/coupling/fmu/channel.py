@@ -14,7 +14,8 @@ import mmap
 import os
 import select
 import tempfile
-from collections.abc import Callable
+from collections.abc import Callable, Iterator
+from contextlib import contextmanager
 from struct import Struct
 from time import perf_counter
 from typing import Any
@@ -40,6 +41,22 @@ class Ended(Exception):
 
 class TooLate(Exception):
     """There is no answer in time."""
+
+
+_waiting: list[Callable[[float], None]] = []
+
+
+@contextmanager
+def waiting(call: Callable[[float], None]) -> Iterator[None]:
+    """Let `call` be made, with the time of the FMU (s), again and again while the answer of one is waited for.
+
+    What it raises gives the FMU up: its process is ended.
+    """
+    _waiting.append(call)
+    try:
+        yield
+    finally:
+        _waiting.remove(call)
 
 
 def aligned(size: int) -> int:
@@ -91,7 +108,7 @@ class Channel:
     ----------
     largest : bytes of all variables of the FMU together
     printed : receives the lines that the process prints
-    idle : called again and again while an answer is waited for
+    time : returns the time of the FMU, s
 
     Attributes
     ----------
@@ -100,7 +117,7 @@ class Channel:
     timeout : s that an answer may take; None: as long as it likes
     """
 
-    def __init__(self, largest: int, printed: Callable[[str], None], idle: Callable[[], None]):
+    def __init__(self, largest: int, printed: Callable[[str], None], time: Callable[[], float]):
         self.answers = START + aligned(JOURNAL + 2 * largest)
         self.size = self.answers + aligned(JOURNAL + 2 * largest)
         self.shared = shared_memory(self.size)
@@ -108,7 +125,7 @@ class Channel:
         self.timeout: float | None = None
         self.end, self.deadline = START, 0.0
         self._end: int | None = None
-        self._printed, self._idle, self._text = printed, idle, b""
+        self._printed, self._time, self._text = printed, time, b""
         self._received, self._requests = os.pipe()
         self._inbox, self._answered = os.pipe()
         self._lines, self._prints = os.pipe()
@@ -199,7 +216,8 @@ class Channel:
             raise TooLate
         if ready and not ready & {self._inbox, self._lines}:
             raise Ended
-        self._idle()
+        for call in _waiting:
+            call(self._time())
 
     def _listen(self) -> None:
         """Take what the process prints, line by line."""

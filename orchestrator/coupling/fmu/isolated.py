@@ -73,6 +73,7 @@ class Owner(Protocol):
     """
 
     log: Messages
+    time: float
     fate: tuple[int, str] | None
 
     def error(self, status: int, doing: str) -> FmuError:
@@ -124,7 +125,7 @@ class Isolated:
         self._reading: list[_Read] = []
         self._state, self._step, self._stepped = 0, 0, -1
         self._result: Any = None
-        self._channel = Channel(largest, owner.log.print, lambda: None)
+        self._channel = Channel(largest, owner.log.print, lambda: owner.time)
         self._channel.timeout = limits.timeout
         self._common = self._channel.answers
         self._free_place = self._common + aligned(largest)
@@ -230,6 +231,11 @@ class Isolated:
     def limit(self, timeout: float) -> None:
         """Let a call take no longer than `timeout`, s."""
         self._channel.timeout = timeout
+
+    @property
+    def pid(self) -> int:
+        """The number of its process."""
+        return self._process.pid
 
     @property
     def took(self) -> float:

@@ -140,6 +140,11 @@ class _Nursery:
         theirs.close()
 
     @property
+    def pid(self) -> int:
+        """The number of its process."""
+        return self._process.pid
+
+    @property
     def alive(self) -> bool:
         """Whether it is there, and ours."""
         return self.owner == os.getpid() and self._process.poll() is None
