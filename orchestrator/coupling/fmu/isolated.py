@@ -305,6 +305,7 @@ class Isolated:
         if self._owner.fate is None:
             self._channel.hang_up()
             self._process.end(0.0 if self._begun else PATIENCE)
+            self._channel.last_words()
             self._owner.fate = CRASHED, "it has been closed"
         self._channel.close()
 
