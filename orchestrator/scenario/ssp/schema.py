@@ -1,0 +1,22 @@
+"""A description held against the official schema of SSP 1.0, which comes with FMPy."""
+
+from __future__ import annotations
+
+from pathlib import Path
+
+import fmpy.ssp
+from lxml import etree
+
+SCHEMAS = Path(fmpy.ssp.__file__).parent / "schema"
+MOST = 3
+"""Violations that are told."""
+
+
+def violations(content: bytes, schema: str) -> list[str]:
+    """Return what the schema says against a file that has no document type, a line each; the first few."""
+    parser = etree.XMLParser(resolve_entities=False, no_network=True, huge_tree=False)
+    rules = etree.XMLSchema(etree.parse(str(SCHEMAS / schema)))
+    if rules.validate(etree.fromstring(content, parser)):
+        return []
+    found = [f"line {entry.line}: {entry.message}" for entry in rules.error_log]  # type: ignore[attr-defined]
+    return found[:MOST]
