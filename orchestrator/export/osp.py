@@ -33,8 +33,8 @@ def structure(package: Package) -> Element:
     if scaled:
         functions = SubElement(root, "Functions")
         for link in scaled:
-            scale = {"factor": repr(link.gain), "offset": repr(link.offset)}
-            SubElement(functions, "LinearTransformation", name=function_of(link), **scale)
+            scale = {"name": function_of(link), "factor": repr(link.gain), "offset": repr(link.offset)}
+            SubElement(functions, "LinearTransformation", scale)
     if package.wires:
         connections = SubElement(root, "Connections")
         for link in package.wires:

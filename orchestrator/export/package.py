@@ -4,6 +4,7 @@ from __future__ import annotations
 
 from collections.abc import Iterator, Mapping
 from dataclasses import dataclass, replace
+from importlib.metadata import PackageNotFoundError, version
 from pathlib import Path
 
 from orchestrator.coupling.errors import InputError
@@ -14,6 +15,17 @@ from orchestrator.coupling.graph.graph import Graph
 from orchestrator.coupling.graph.links import Link, Signal, checked_links, owner_of, variable_of
 from orchestrator.runs.components import recorded
 from orchestrator.scenario.types import Scenario, Simulation
+
+
+def _tool() -> str:
+    try:
+        return f"line-landing {version('line-landing')}"
+    except PackageNotFoundError:  # a source tree that was never installed
+        return "line-landing"
+
+
+TOOL = _tool()
+"""Who writes the package."""
 
 
 @dataclass(frozen=True)
@@ -82,7 +94,7 @@ def packed(scenario: Scenario, graph: Graph) -> Package:
     problems = [*_over_time(graph), *_arrays(graph)]
     if problems:
         raise InputError(f"{scenario.path}: {problem}" for problem in problems)
-    kept = {signal.partition(".")[::2] for signal in recorded(graph, scenario)}
+    kept = {(owner_of(signal), variable_of(signal)) for signal in recorded(graph, scenario)}
     links = tuple(checked_links(graph.components, graph.connections))
     kept |= {end for link in links for end in (link.source, link.target)}
     parts = tuple(_part(name, fmu, kept) for name, fmu in graph.components.items())

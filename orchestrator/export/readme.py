@@ -2,9 +2,8 @@
 
 from __future__ import annotations
 
-import orchestrator
 from orchestrator.coupling.errors import digits
-from orchestrator.export.package import Package
+from orchestrator.export.package import TOOL, Package
 
 
 def readme(package: Package, file: str) -> str:
@@ -15,7 +14,7 @@ def readme(package: Package, file: str) -> str:
     told = "\n".join(f"- {note}." for note in package.notes)
     return f"""# {package.title}
 
-`{file}`, written by line-landing {orchestrator.__version__}: from {span}, macro step {digits(simulation.macro_step)} s.
+`{file}`, written by {TOOL}: from {span}, macro step {digits(simulation.macro_step)} s.
 
 | component | FMU | values given | connectors |
 |---|---|---|---|

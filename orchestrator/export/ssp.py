@@ -2,14 +2,13 @@
 
 from __future__ import annotations
 
-from collections.abc import Iterator
+from collections.abc import Sequence
 from xml.etree import ElementTree
 from xml.etree.ElementTree import Element, SubElement
 
-import orchestrator
 from orchestrator.coupling.fmu.description import Port
 from orchestrator.export.baked import text_of
-from orchestrator.export.package import Package, Part
+from orchestrator.export.package import TOOL, Package, Part
 from orchestrator.scenario.ssp.names import (
     ANNOTATION,
     DEFAULT_SSD,
@@ -24,12 +23,18 @@ from orchestrator.scenario.ssp.names import (
 )
 
 VALUES = "resources/parameters.ssv"
-TOOL = f"line-landing {orchestrator.__version__}"
+"""All values, by the names that they have in the system. Each component has its own besides: some engines look nowhere else."""
 
 
 def files(package: Package) -> dict[str, bytes]:
     """Return what stands in the archive, name → content, without the FMUs."""
-    return {DEFAULT_SSD: text(description(package)), VALUES: text(parameter_set(package))}
+    own = {_values_of(part): text(parameter_set(package, (part,), "")) for part in package.parts if part.values}
+    everything = text(parameter_set(package, package.parts, "{}."))
+    return {DEFAULT_SSD: text(description(package)), VALUES: everything} | own
+
+
+def _values_of(part: Part) -> str:
+    return f"resources/{part.name}.ssv"
 
 
 def text(root: Element) -> bytes:
@@ -45,8 +50,7 @@ def description(package: Package) -> Element:
     root = Element(f"{{{SSD}}}SystemStructureDescription", version="1.0", name=package.name, generationTool=TOOL)
     root.set("description", package.title)
     system = SubElement(root, f"{{{SSD}}}System", name=package.name)
-    bindings = SubElement(system, f"{{{SSD}}}ParameterBindings")
-    SubElement(bindings, f"{{{SSD}}}ParameterBinding", type=PARAMETER_SET, source=VALUES)
+    _bind(system, VALUES)
     elements = SubElement(system, f"{{{SSD}}}Elements")
     for part in package.parts:
         _component(elements, part, package)
@@ -67,6 +71,13 @@ def _component(parent: Element, part: Part, package: Package) -> None:
     for port in part.ports:
         connector = SubElement(connectors, f"{{{SSD}}}Connector", name=port.name, kind=port.causality)
         _type(connector, port, package)
+    if part.values:
+        _bind(component, _values_of(part))
+
+
+def _bind(parent: Element, source: str) -> None:
+    bindings = SubElement(parent, f"{{{SSD}}}ParameterBindings")
+    SubElement(bindings, f"{{{SSD}}}ParameterBinding", type=PARAMETER_SET, source=source)
 
 
 def _type(connector: Element, port: Port, package: Package) -> None:
@@ -111,22 +122,20 @@ def _annotation(parent: Element, package: Package) -> None:
         SubElement(coupling, f"{{{LINE_LANDING}}}Note").text = note
 
 
-def parameter_set(package: Package) -> Element:
-    """Return the parameter set: parameters and held inputs, ``component.variable``."""
+def parameter_set(package: Package, parts: Sequence[Part], prefix: str) -> Element:
+    """Return the parameter set of some components: parameters and held inputs, their names after a `prefix`."""
     root = Element(f"{{{SSV}}}ParameterSet", version="1.0", name=package.name, generationTool=TOOL)
     parameters = SubElement(root, f"{{{SSV}}}Parameters")
-    for parameter in _parameters(package):
-        parameters.append(parameter)
-    _units(root, SSV, package, {unit for part in package.parts for unit in part.units.values()})
+    for part in parts:
+        _parameters(parameters, part, package, prefix.format(part.name))
+    _units(root, SSV, package, {unit for part in parts for unit in part.units.values()})
     return root
 
 
-def _parameters(package: Package) -> Iterator[Element]:
-    for part in package.parts:
-        for name, value in part.values.items():
-            parameter = Element(f"{{{SSV}}}Parameter", name=f"{part.name}.{name}")
-            kind, unit = part.kinds[name], part.units[name]
-            typed = SubElement(parameter, f"{{{SSV}}}{KINDS[kind]}", value=text_of(value))
-            if kind == "real" and unit in package.units:
-                typed.set("unit", unit)
-            yield parameter
+def _parameters(parent: Element, part: Part, package: Package, prefix: str) -> None:
+    for name, value in part.values.items():
+        parameter = SubElement(parent, f"{{{SSV}}}Parameter", name=prefix + name)
+        kind, unit = part.kinds[name], part.units[name]
+        typed = SubElement(parameter, f"{{{SSV}}}{KINDS[kind]}", value=text_of(value))
+        if kind == "real" and unit in package.units:
+            typed.set("unit", unit)

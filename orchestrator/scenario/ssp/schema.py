@@ -2,11 +2,13 @@
 
 from __future__ import annotations
 
+from importlib import import_module
 from pathlib import Path
+from typing import Any
 
 import fmpy.ssp
-from lxml import etree
 
+etree: Any = import_module("lxml.etree")  # compiled, and without types
 SCHEMAS = Path(fmpy.ssp.__file__).parent / "schema"
 MOST = 3
 """Violations that are told."""
@@ -18,5 +20,5 @@ def violations(content: bytes, schema: str) -> list[str]:
     rules = etree.XMLSchema(etree.parse(str(SCHEMAS / schema)))
     if rules.validate(etree.fromstring(content, parser)):
         return []
-    found = [f"line {entry.line}: {entry.message}" for entry in rules.error_log]  # type: ignore[attr-defined]
+    found = [f"line {entry.line}: {entry.message}" for entry in rules.error_log]
     return found[:MOST]
