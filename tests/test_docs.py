@@ -115,6 +115,7 @@ def test_the_reference_names_every_command_and_option(from_code: Any) -> None:
         "build",
         "check",
         "compare",
+        "export",
         "identify",
         "limits",
         "list",
@@ -144,6 +145,12 @@ def test_measured_numbers_are_those_of_the_file() -> None:
         text = page.read_text(encoding="utf-8")
         assert measured["BLOCK"].search(text), page
         assert measured["filled"](text, found) == text, f"{page}: python docs/measured.py --fill"
+
+
+def test_the_table_of_engines_is_that_of_its_file() -> None:
+    made = runpy.run_path(str(DOCS / "engines.py"))
+    text = made["PAGE"].read_text(encoding="utf-8")
+    assert made["filled"](text, json.loads(made["FILE"].read_text(encoding="utf-8"))) == text, "docs/engines.py --fill"
 
 
 def test_the_page_of_robots_on_lines_is_that_of_its_file() -> None:

@@ -274,14 +274,20 @@ def chain(tmp_path_factory) -> Case:
 
 
 @needs_compiler
-@pytest.mark.parametrize("engine", ["fmpy_set", "cosim_osp", "cosim_ssp", "ecos_ssp"])
+@pytest.mark.parametrize("engine", ["fmpy_set", "cosim_osp", "cosim_ssp", "ecos_set"])
 def test_where_the_algorithm_is_the_same_so_is_the_result(engine, chain):
     """C FMUs without feedthrough that start at zero: all step, then all values move. To round-off of 100 sums."""
     found = by_engine(engine, place(chain.exported, engine), 0.01, 100, "a.y", "b.y", "c.y")
     np.testing.assert_allclose(found, chain.ours, rtol=0.0, atol=1e-15 * 100 * np.max(np.abs(chain.ours)))
 
 
-@pytest.mark.parametrize("engine", ["fmpy_ssp", "cosim_osp", "cosim_ssp", "ecos_ssp"])
+SLOW = pytest.mark.slow
+"""What starts an interpreter and loads kernels for no engine that another test does not have."""
+
+
+@pytest.mark.parametrize(
+    "engine", ["fmpy_ssp", "cosim_osp", pytest.param("cosim_ssp", marks=SLOW), pytest.param("ecos_ssp", marks=SLOW)]
+)
 def test_other_engines_agree_to_the_order_of_the_step(engine, coarse, fine):
     """The spring's force is a step older there: half the step, half the difference."""
     distance = []
@@ -291,7 +297,9 @@ def test_other_engines_agree_to_the_order_of_the_step(engine, coarse, fine):
     assert 0.8 < np.log2(distance[0] / distance[1]) < 1.2, distance
 
 
-@pytest.mark.parametrize("engine", ["fmpy_ssp", "cosim_osp", "ecos_ssp"])
+@pytest.mark.parametrize(
+    "engine", [pytest.param("fmpy_ssp", marks=SLOW), "cosim_osp", pytest.param("ecos_ssp", marks=SLOW)]
+)
 def test_the_robot_lands_in_other_engines(engine, landing):
     """It falls 1 mm and is caught after 14 ms. There the contact is a step late, or two where the first step has zeros: what
     moves is wrong by what it moves in as many steps, at most."""

@@ -111,8 +111,8 @@ def test_what_we_have_exported_runs_as_before_to_the_last_bit(kind, tmp_path):
     export(loaded, ssp_file=tmp_path / "model.ssp", osp_folder=tmp_path / "osp")
     before = run(OSCILLATOR, master="jacobi", stop=0.5, estimate="none")
     after = run(tmp_path / kind, master="jacobi", estimate="none")
-    assert list(after) == list(before)
-    for name, signal in before.items():
+    assert sorted(after.signals) == sorted(before.signals)
+    for name, signal in before.signals.items():
         np.testing.assert_array_equal(after[name].values, signal.values)
 
 
@@ -168,10 +168,10 @@ def test_nested_systems_are_flattened(pack):
     assert list(found.components) == ["left", "right_mass"]
     assert found.components["left"].parameters == {"mass": 3.0, "initial_position": 0.5}
     assert found.components["right_mass"].parameters == {"coupling_stiffness": 100.0}
-    assert found.connections == [
+    assert set(found.connections) == {
         "2.0 * left.position - 0.25 -> right_mass.neighbour.position",
         "right_mass.neighbour.force -> left.force",
-    ]
+    }
     assert any("elsewhere.mass" in note for note in found.notes)
     assert run(found, estimate="none", stop=0.1, macro_step=0.01).verdict != "failed"
 

@@ -83,12 +83,12 @@ def simulation(
     notes: list[str] = []
     if master is None:
         master = DEFAULT_MASTER if all(unit.goes_back for unit in units) else FORWARD_MASTER
-        notes.append(f"{place.name} names no master: {master}; another one with --master")
+        notes.append(f"{place.name} names no master: {master}, unless another one is given")
     own = [unit.step for unit in units if unit.step is not None]
     if step is None:
         given, why = (min(own), "the smallest of its FMUs' own") if own else (None, f"1/{STEPS} of the run")
         step = _whole(start, stop, given)
-        notes.append(f"{place.name} names no macro step: {digits(step)} s, {why}; another one with --macro-step")
+        notes.append(f"{place.name} names no macro step: {digits(step)} s, {why}, unless another one is given")
     return found | {"macro_step": step, "master": master}, notes
 
 
