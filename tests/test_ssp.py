@@ -2,11 +2,14 @@
 
 from __future__ import annotations
 
+import contextlib
 import zipfile
 from pathlib import Path
 
 import numpy as np
 import pytest
+from hypothesis import HealthCheck, given, settings
+from hypothesis import strategies as st
 
 from orchestrator import load_scenario, run
 from orchestrator.catalogue.library import module_fmu
@@ -20,6 +23,8 @@ from orchestrator.scenario.ssp import archive
 from tests.fmus import compiled, needs_compiler
 from tests.scenarios import OSCILLATOR
 from tests.systems import closing
+
+pytestmark = pytest.mark.filterwarnings("ignore::orchestrator.scenario.types.ScenarioNote")
 
 SPACES = " ".join(
     f'xmlns:{prefix}="http://ssp-standard.org/SSP1/SystemStructure{name}"'
@@ -260,6 +265,31 @@ def test_what_is_not_read_is_named(pack, ssd, said):
 def test_an_invalid_description_is_read_and_that_is_said(pack):
     ssd = structure(system(mass("a", more='colour="red"')))
     assert any("not valid by the schema" in note and "colour" in note for note in load_scenario(pack(ssd)).notes)
+
+
+def test_a_circle_of_connectors_ends(pack):
+    inside = system(mass("a"), connection("x", "y") + connection("y", "x"), connectors(x="input", y="input"), name="in")
+    assert load_scenario(pack(structure(system(inside)))).connections == []
+
+
+def test_systems_may_not_lie_without_end_in_one_another(pack):
+    inside = mass("a")
+    for depth in range(60):
+        inside = system(inside, name=f"s{depth}")
+    assert "deep in one another" in refused(pack(structure(system(inside))))
+
+
+@given(
+    start=st.integers(0, len(NESTED)),
+    length=st.integers(0, 40),
+    filling=st.sampled_from(("", '"', "<", "nan", "1e999", "x.")),
+)
+@settings(max_examples=60, suppress_health_check=[HealthCheck.function_scoped_fixture])
+def test_whatever_stands_there_ends_in_a_scenario_or_a_message(pack, start, length, filling):
+    """A span of the description is taken out, or something else is in its place."""
+    outer = values(real("left.mass", 3.0))
+    with contextlib.suppress(InputError):
+        load_scenario(pack(NESTED[:start] + filling + NESTED[start + length :], **{"values.ssv": outer}))
 
 
 # -- archives ---------------------------------------------------------------------------------------------------------

@@ -53,7 +53,9 @@ def starting(incomplete: str, names: Iterable[str]) -> Iterator[str]:
 Scenario = Annotated[
     str,
     typer.Argument(
-        metavar="SCENARIO", help="Scenario file (TOML, SSP, OSP), or the name of a shipped one.", autocompletion=scenarios
+        metavar="SCENARIO",
+        help="Scenario file (TOML, SSP, OSP), or the name of a shipped one.",
+        autocompletion=scenarios,
     ),
 ]
 Out = Annotated[

@@ -18,6 +18,7 @@ def notes(package: Package, graph: Graph, asked: Scenario) -> tuple[str, ...]:
         *_step(package),
         *_late(graph),
         *_start(graph),
+        *_versions(graph),
         *_units(package),
         *_values(package),
     )
@@ -64,6 +65,12 @@ def _start(graph: Graph) -> Iterator[str]:
         "our start-up moves values along the connections until they stay; an engine that makes its first step with zeros "
         "begins with other forces, an error of the order of its step"
     )
+
+
+def _versions(graph: Graph) -> Iterator[str]:
+    newer = [name for name, fmu in graph.components.items() if str(fmu.description.fmiVersion).startswith("3")]
+    if newer:
+        yield f"FMUs of FMI 3.0 ({', '.join(newer)}), of which SSP 1.0 and OSP do not speak: not every engine takes them"
 
 
 def _units(package: Package) -> Iterator[str]:

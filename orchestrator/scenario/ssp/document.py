@@ -51,9 +51,14 @@ def document(path: Path) -> tuple[Document, list[str]]:
     ------
     InputError : it cannot be read, or has what is not understood: the construct is named
     """
+    try:
+        return osp.document(path) if path.name == OSP_FILE else _document(path)
+    except (ValueError, KeyError, ArithmeticError, OSError) as error:
+        raise InputError(f"{path}: is not as its standard has it: {error}; export it anew") from None
+
+
+def _document(path: Path) -> tuple[Document, list[str]]:
     files = opened(path)
-    if files.main == OSP_FILE:
-        return osp.document(path)
     content = _content(files)
     root = parsed(content, f"{path}: {files.main}")
     system = flattened(files, root)

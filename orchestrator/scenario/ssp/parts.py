@@ -95,7 +95,7 @@ def simulation(
 def _whole(start: float, stop: float | None, step: float | None) -> float:
     """Return a step, or the next smaller one that divides the span."""
     length = (stop if stop is not None else start + 1.0) - start
-    if step is None or not step > 0.0:
+    if step is None or not (0.0 < step < math.inf and math.isfinite(length)):
         return length / STEPS
     count = length / step
     return step if abs(count - round(count)) < 1e-9 * count else length / math.ceil(count)

@@ -17,6 +17,8 @@ Place = tuple[str, ...]
 """Names of elements from the outermost system inwards; its own is left out."""
 End = tuple[Place, str]
 """An element and a connector of it."""
+DEEPEST = 50
+"""Systems within one another."""
 TRANSFORMATIONS = (
     "LinearTransformation",
     "BooleanMappingTransformation",
@@ -51,13 +53,16 @@ class System:
     lines: dict[End, list[Line]] = field(default_factory=dict)
     elements: dict[Place, Element] = field(default_factory=dict)
 
-    def leads_to(self, end: End) -> Iterator[Line]:
-        """Yield the connectors of components that a connector leads to, with the transformations on the way."""
+    def leads_to(self, end: End, passed: frozenset[End] = frozenset()) -> Iterator[Line]:
+        """Yield the connectors of components that a connector leads to, with the transformations on the way.
+
+        A way that comes back to a connector of `passed` leads nowhere.
+        """
         for line in self.lines.get(end, ()):
             if line.target[0] in self.components:
                 yield line
                 continue
-            for further in self.leads_to(line.target):
+            for further in self.leads_to(line.target, passed | {end}) if line.target not in passed else ():
                 factor = line.factor * further.factor
                 yield Line(further.target, factor, further.factor * line.offset + further.offset)
 
@@ -79,6 +84,8 @@ def name_of(place: Place) -> str:
 
 def _enter(files: Files, system: System, element: Element, place: Place) -> None:
     system.elements[place] = element
+    if len(place) > DEEPEST:
+        raise InputError(f"{files.place}: systems lie more than {DEEPEST} deep in one another; flatten them")
     if child(element, "SignalDictionaries", "SignalDictionary") is not None:
         raise InputError(
             f"{files.place}: {_words(place)}: signal dictionaries (SSB) are not read; connect the FMUs directly"

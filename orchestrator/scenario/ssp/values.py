@@ -85,11 +85,7 @@ def _content(files: Files, element: Element, inline: tuple[str, ...], kind: str,
 
 def _given(files: Files, root: Element, content: Element, source: str) -> dict[str, Given]:
     units = {one.get("name", ""): one for place in (root, content) for one in children(place, "Units", "Unit")}
-    enumerations = {
-        one.get("name", ""): {item.get("name", ""): int(number(item, "value")) for item in children(one, "Item")}
-        for place in (root, content)
-        for one in children(place, "Enumerations", "Enumeration")
-    }
+    enumerations = _enumerations(root) | _enumerations(content)
     found: dict[str, Given] = {}
     for parameter in children(content, "Parameters", "Parameter"):
         name = parameter.get("name", "")
@@ -99,6 +95,13 @@ def _given(files: Files, root: Element, content: Element, source: str) -> dict[s
             raise InputError(f"{files.place}: {source}: {name}: {error}") from None
         found[name] = Given(value, unit, units, source=source)
     return found
+
+
+def _enumerations(place: Element) -> dict[str, dict[str, int]]:
+    return {
+        one.get("name", ""): {item.get("name", ""): int(number(item, "value")) for item in children(one, "Item")}
+        for one in children(place, "Enumerations", "Enumeration")
+    }
 
 
 def _value(parameter: Element, enumerations: Mapping[str, Mapping[str, int]]) -> tuple[float | int | bool | str, str]:
