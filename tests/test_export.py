@@ -282,11 +282,11 @@ def test_where_the_algorithm_is_the_same_so_is_the_result(engine, chain):
 
 
 SLOW = pytest.mark.slow
-"""What starts an interpreter and loads kernels for no engine that another test does not have."""
+"""What loads our kernels into an engine that runs in another test anyway: some seconds each."""
 
 
 @pytest.mark.parametrize(
-    "engine", ["fmpy_ssp", "cosim_osp", pytest.param("cosim_ssp", marks=SLOW), pytest.param("ecos_ssp", marks=SLOW)]
+    "engine", ["fmpy_ssp", *(pytest.param(name, marks=SLOW) for name in ("cosim_osp", "cosim_ssp", "ecos_ssp"))]
 )
 def test_other_engines_agree_to_the_order_of_the_step(engine, coarse, fine):
     """The spring's force is a step older there: half the step, half the difference."""

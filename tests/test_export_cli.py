@@ -30,11 +30,5 @@ def test_export_writes_and_says_what_is_lost(tmp_path):
 
 def test_wrong_input_ends_with_status_2(tmp_path):
     (tmp_path / "broken.ssp").write_text("no archive")
-    for arguments, said in (
-        (("export", "oscillator"), "say where to"),
-        (("run", tmp_path / "broken.ssp"), "no SSP"),
-        (("export", tmp_path / "none.toml", "--ssp", tmp_path / "x.ssp"), "no such scenario"),
-    ):
-        done = orchestrate(*arguments)
-        assert done.returncode == 2 and said in done.stderr
-    assert not (tmp_path / "x.ssp").exists()
+    done = orchestrate("run", tmp_path / "broken.ssp")
+    assert done.returncode == 2 and "no SSP" in done.stderr
