@@ -109,8 +109,8 @@ LANDING = (
     _Kind("Angle", r"robot\.(roll|pitch|yaw)", "°", DEGREES, "rad"),
     _Kind("Sum of wall forces", r"contact(\d+)\.normal_force", "N", 1.0, "N", "wheel {}", peaks=True),
     _Kind("Cable tension", r"cable\.tension_()mid", "kN", 1e-3, "N"),
-    _Kind("Thrust", r"robot\.()thrust", "N", 1.0, "N", if_it_varies=True),
-    _Kind("Torque", r"robot\.torque\.([xyz])", "N m", 1.0, "N.m", "about {}", if_it_varies=True),
+    _Kind("Thrust", r"(?:robot|controller)\.()thrust", "N", 1.0, "N", if_it_varies=True),
+    _Kind("Torque", r"(?:robot|controller)\.torque\.([xyz])", "N m", 1.0, "N.m", "about {}", if_it_varies=True),
     _Kind("Drive torque", r"robot\.wheel\[(\d+)\]\.drive_torque", "N m", 1.0, "N.m", "wheel {}", if_it_varies=True),
 )
 
