@@ -20,16 +20,16 @@ from orchestrator.landing.resolve import resolve
 from orchestrator.report.page.whatif import whatif_of
 from orchestrator.report.signals import panels_for
 from orchestrator.runs.coupled import run_coupled
-from orchestrator.runs.systems import LandingSystem
 from orchestrator.runs.directory import RunDirectory
+from orchestrator.runs.systems import LandingSystem
 from orchestrator.runs.whatif import leave
 from orchestrator.scenario.read import load
 from orchestrator.scenario.types import LandingScenario
 from tests.scenarios import SCENARIOS, scenario
 
 RIG, POINT9 = "rig_10m_controlled", "landing_200m_point9_setdown"
-QUICK = {"landing__height": 0.01, "controller__parameters__ramp_time": 0.4}
-"""It touches at about 0.3 s, and is down at 0.8 s."""
+QUICK = {"landing__position": 3.0, "landing__height": 0.01, "controller__parameters__ramp_time": 0.4}
+"""It touches at about 0.3 s, beside the middle, so that it rolls, and is down at 0.8 s."""
 SAME_LAW = ("controller.thrust", "controller.torque.x")
 WEIGHT = 38.0 * 9.8
 
@@ -91,14 +91,18 @@ def runs():
 
 
 def test_coupled_comes_to_monolithic(runs):
-    """The same law: touch-down at the same instant. The error is that of the exchange, with touch inside a step of order 2."""
+    """The same law: touch-down at the same instant, and an error of the exchange's order, 3 where touch falls inside a step."""
     coupled, reference = runs
     for name in ("robot.body.position.z", *SAME_LAW):
         exact = reference.signals[name]
         coarse, fine = (
             np.max(np.abs(run.table[name] - exact[:: round(h / 0.005)])) / np.ptp(exact) for h, run in coupled.items()
         )
-        assert fine < 1e-4 and fine < 0.5 * coarse, name
+        assert fine < coarse / 2.0**2.5, name
+    assert (
+        np.max(np.abs(coupled[0.005].table["robot.body.position.z"] - reference.signals["robot.body.position.z"]))
+        < 1e-8
+    )
     for run in coupled.values():
         touched = reference.signals["controller.touch_time"][-1]
         assert run.table["controller.touch_time"][-1] == pytest.approx(touched, rel=1e-12) and touched > 0.0
@@ -109,7 +113,7 @@ def test_books_balance_with_a_controller(runs):
     """The work of thrust and torque is among the terms, and is most of what the robot gives up in height."""
     coupled, reference = runs
     found = audit.of_monolithic({"time": reference.time, **reference.signals}, reference.estimated_error)
-    assert found is not None and found.within and np.isfinite(found.allowed)
+    assert found is not None and found.drift < 1e-6 * found.exchanged
     found = audit.of_coupled(coupled[0.005].table, [1e-4])
     assert found is not None and found.within
     assert abs(found.terms["robot.control_work"][-1]) > 0.1 * found.exchanged
@@ -148,7 +152,7 @@ def test_point_9_rolls_less_than_when_it_is_let_go():
 
 def test_modes_are_those_of_the_robot_that_is_down():
     """As with the last share of the weight held by hand; the feedback is no part of them."""
-    flown = at_rest(landing.problem(one(controller__parameters__final_share=0.5)))
+    flown = at_rest(landing.problem(one(landing__height=0.0, controller__parameters__final_share=0.5)))
     held = at_rest(landing.problem(one("rig_10m", robot__inputs__thrust=0.5 * WEIGHT)))
     assert np.max(np.abs(flown.q - held.q)) < 1e-9
 
@@ -164,7 +168,8 @@ def foreign() -> Path:
 def test_a_controller_may_be_any_fmu(foreign, runs):
     """Ours under a path: the same run to the bit, but nothing stands for it in the monolithic solver."""
     section = f'controller={{fmu="{foreign}",parameters={{descent_speed=0.1,ramp_time=0.4}}}}'
-    bare = load(SCENARIOS / "rig_10m.toml", ["simulation.stop_time=0.5", "landing.height=0.01", section])
+    start = ["landing.height=0.01", "landing.position=3.0"]
+    bare = load(SCENARIOS / "rig_10m.toml", ["simulation.stop_time=0.5", *start, section])
     assert isinstance(bare, LandingScenario) and not landing.has_monolithic(resolve(bare))
     ours, theirs = runs[0][0.005].table, run_coupled(bare).table
     for name in ("robot.body.position.z", *SAME_LAW):
@@ -188,7 +193,8 @@ def test_thrust_and_torque_are_shown(runs):
 
 
 def test_a_page_says_why_it_has_no_what_if(tmp_path):
-    leave(RunDirectory(tmp_path), LandingSystem(resolve(one())))
-    found = whatif_of(tmp_path, tmp_path).about
+    folder = tmp_path / "run"
+    leave(RunDirectory(folder), LandingSystem(resolve(one())))
+    found = whatif_of(folder, tmp_path).about
     assert found is not None and "a controller flies this landing" in found["reason"] and found["starts"] == []
-    assert not (tmp_path / "start.bin").exists()
+    assert not (folder / "start.bin").exists()

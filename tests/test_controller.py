@@ -3,6 +3,7 @@
 from __future__ import annotations
 
 import math
+from itertools import pairwise
 
 import numpy as np
 import pytest
@@ -74,7 +75,7 @@ def test_a_level_robot_hovers():
 
 
 def test_the_way_down_is_that_of_the_sampled_loop():
-    """What is wrong in height is e'' = -2 ζ ω e' - ω² e between instants held; the robot's steps of a constant force are exact."""
+    """The error of height follows e'' = -2 ζ ω e' - ω² e, held between instants; the robot is exact under a constant force."""
     h, v = 0.02, 0.3
     found = fly(robot(), controller(descent_speed=v, sample_time=h), 4.0, h)
     error = sampled(np.array([0.0, -v]), 2.0, 1.0, h, found["t"].size - 1)
@@ -90,7 +91,7 @@ def test_the_way_down_comes_to_the_continuous_loop_with_the_first_order_of_the_s
         return float(np.max(np.abs(found["z"] + 0.3 * found["t"] - lag)))
 
     errors = [miss(h) for h in (0.02, 0.01, 0.005)]
-    assert [np.log2(a / b) for a, b in zip(errors, errors[1:], strict=False)] == pytest.approx([1.0, 1.0], abs=0.1)
+    assert [np.log2(a / b) for a, b in pairwise(errors)] == pytest.approx([1.0, 1.0], abs=0.1)
 
 
 def test_roll_goes_back_as_a_damped_oscillator():

@@ -27,6 +27,7 @@ BY_COMMAND = {
     DOCS / "verification.md",
     DOCS / "reproduction.md",
     DOCS / "robots_on_lines.md",
+    DOCS / "setting_down.md",
     *DOCS.glob("reference/generated/*.md"),
     *DOCS.glob("_build/**/*.md"),
 }
