@@ -106,10 +106,6 @@ def run(figures: Path) -> Result:
     table = [row for case, pair in zip(cases, found, strict=True) for row in rows(*case, *pair)]
     ends = {how: sum(reference.how == how for _, reference in found) for how in dict.fromkeys(r.how for _, r in found)}
     counted = ", ".join(f"{how}: {count}" for how, count in ends.items())
-    said = [
-        f"- {robot}, {line}: {one.why}"
-        for (robot, line), pair in zip(cases, found, strict=True)
-        for one in pair
-        if one.why
-    ]
+    stopped = [(case, one.why) for case, pair in zip(cases, found, strict=True) for one in pair if one.why]
+    said = [f"- {robot}, {line}: {why}" for (robot, line), why in stopped]
     return Result(table, remark="\n".join([f"{STOP:g} s each. {counted}.", "", *said]).strip())
