@@ -17,6 +17,7 @@ from orchestrator.landing.monolithic import solve
 from orchestrator.landing.monolithic.linear import at_rest
 from orchestrator.landing.monolithic.solve import integrate
 from orchestrator.landing.resolve import resolve
+from orchestrator.report.page.curves import plots_of
 from orchestrator.report.page.whatif import whatif_of
 from orchestrator.report.signals import panels_for
 from orchestrator.runs.coupled import run_coupled
@@ -171,6 +172,7 @@ def test_a_controller_may_be_any_fmu(foreign, runs):
     start = ["landing.height=0.01", "landing.position=3.0"]
     bare = load(SCENARIOS / "rig_10m.toml", ["simulation.stop_time=0.5", *start, section])
     assert isinstance(bare, LandingScenario) and not landing.has_monolithic(resolve(bare))
+    assert landing.problem(bare).controller is None
     ours, theirs = runs[0][0.005].table, run_coupled(bare).table
     for name in ("robot.body.position.z", *SAME_LAW):
         assert np.array_equal(theirs[name], ours[name][: theirs["time"].size])
@@ -188,8 +190,11 @@ def test_the_contract_knows_a_controller(foreign):
 
 
 def test_thrust_and_torque_are_shown(runs):
-    labels = [panel.label for panel in panels_for(runs[0][0.005].table)]
-    assert "Thrust" in labels
+    table = runs[0][0.005].table
+    panels = [panel.label for panel in panels_for(table)]
+    plots = {plot.title: [signal.name for signal in plot.signals] for plot in plots_of(table, {})}
+    assert {"Thrust", "Torque"} <= set(panels) & set(plots)
+    assert plots["Thrust"] == ["controller.thrust"] and plots["Torque"] == ["controller.torque.x"]
 
 
 def test_a_page_says_why_it_has_no_what_if(tmp_path):

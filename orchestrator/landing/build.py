@@ -35,7 +35,8 @@ def problem(landing: Landing | LandingScenario) -> Problem:
     cable, robot = cable_module(landing.cable), robot_module(landing.robot, landing.n_wheels)
     robot.initialize(0.0)
     contacts = [contact_module(landing.contact, s) for s in landing.placement.arc_lengths]
-    controller = controller_module(landing) if landing.controller is not None else None
+    flown = landing.controller is not None and _samples(landing)
+    controller = controller_module(landing) if flown else None
     return Problem(cable, robot, contacts, landing.robot.courses, controller)
 
 
