@@ -132,7 +132,7 @@ def panels_for(
 def _of_kind(kind: _Kind, table: Table) -> Panel:
     found = {n: kind.words.format(m[1]) if m[1] else "" for n in table if (m := re.fullmatch(kind.pattern, n))}
     if kind.if_it_varies:
-        found = {name: words for name, words in found.items() if np.ptp(table[name]) > 0.0}
+        found = {name: words for name, words in found.items() if np.ptp(shown(table[name], kind.own_unit)) > 0.0}
     lines = found if len(found) > 1 else dict.fromkeys(found, "")
     return Panel(kind.label, kind.unit, lines, kind.factor, kind.own_unit, kind.from_start, kind.peaks)
 
