@@ -7,24 +7,35 @@ from __future__ import annotations
 
 import math
 import re
-from typing import TYPE_CHECKING
+from typing import Protocol
 
 import numpy as np
 
+from fmus.cable.state import Work
 from fmus.contact import places as at
 from fmus.kernels.rotations import follow_euler
 from fmus.module.recipe import Module
 from fmus.module.variables import VariableTable
 from fmus.robot import dynamics
 from fmus.robot import rigid_body as rb
+from fmus.robot.module import Robot
 from orchestrator.landing.monolithic.contacts import settle
-
-if TYPE_CHECKING:
-    from orchestrator.landing.monolithic.solve import Integrator
+from orchestrator.landing.monolithic.control_loads import ControlLoads
+from orchestrator.landing.monolithic.state import Space, State, System
 
 SAME_TIME = 1e-9
 """Part of the sample time within which an instant and a time are the same."""
 FORCE = re.compile(r"contact\[(\d+)\]\.normal_force")
+
+
+class Motion(Protocol):
+    """What a controller sees of the solver, and the loads that it writes."""
+
+    system: System
+    state: State
+    space: Space
+    work: Work
+    loads: ControlLoads
 
 
 class Pilot:
@@ -36,9 +47,9 @@ class Pilot:
     outputs : names of what it shows
     """
 
-    def __init__(self, controller: Module, one: Integrator):
+    def __init__(self, controller: Module, robot: Robot, one: Motion):
         self.controller, self.one = controller, one
-        table, robot = controller.table, one.problem.robot
+        table = controller.table
         inputs, self.outputs = table.names("input"), table.names("output")
         self.period = float(controller.values[table.index["sample_time"]])
         self._shown = table.indices(self.outputs)

@@ -119,7 +119,7 @@ class Integrator:
         event = EVENT * (tolerance / TOLERANCE) ** 0.5
         self.options = np.array([0.0, 0.0, longest, float(refinement)])
         self.control = np.array([0.02 * longest, longest, tolerance, event, NEWTON, 0.0, 0.0, 0.0, 0.0])
-        self.pilot = Pilot(problem.controller, self) if problem.controller is not None else None
+        self.pilot = Pilot(problem.controller, robot, self) if problem.controller is not None else None
         if start_time is not None and begin(self.system, self.state, start_time, self.space, self.work) != OK:
             raise ModuleError("monolithic: the contact law fails at the start; check the initial pose of the robot")
         if start_time is not None and self.pilot is not None:
