@@ -9,6 +9,7 @@ from fmus.module.variables import (
     NON_NEGATIVE,
     POSITIVE,
     Bounds,
+    Kind,
     ModuleError,
     Variable,
     VariableTable,
@@ -65,7 +66,7 @@ def _inputs() -> list[Variable]:
 
 
 def _outputs(sampled: tuple[str, ...]) -> list[Variable]:
-    def out(name: str, unit: str, text: str, kind="real") -> Variable:
+    def out(name: str, unit: str, text: str, kind: Kind = "real") -> Variable:
         return Variable(name, "output", unit, 0.0 if kind == "real" else 0, text, kind, (), True, sampled)
 
     return [
