@@ -27,6 +27,7 @@ BY_COMMAND = {
     DOCS / "verification.md",
     DOCS / "reproduction.md",
     DOCS / "robots_on_lines.md",
+    DOCS / "setting_down.md",
     *DOCS.glob("reference/generated/*.md"),
     *DOCS.glob("_build/**/*.md"),
 }
@@ -157,4 +158,10 @@ def test_the_page_of_robots_on_lines_is_that_of_its_file() -> None:
     made = runpy.run_path(str(DOCS / "robots_on_lines.py"))
     found = json.loads(made["FILE"].read_text(encoding="utf-8"))
     assert made["page"](found) == made["PAGE"].read_text(encoding="utf-8"), "python docs/robots_on_lines.py --fill"
+
+
+def test_the_page_of_setting_down_is_that_of_its_file() -> None:
+    made = runpy.run_path(str(DOCS / "setting_down.py"))
+    found = json.loads(made["FILE"].read_text(encoding="utf-8"))
+    assert made["page"](found) == made["PAGE"].read_text(encoding="utf-8"), "python docs/setting_down.py --fill"
     assert made["PICTURE"].exists()

@@ -81,7 +81,7 @@ def _make_room(document: Document, above: Document) -> list[str]:
 
 def _sections(document: Document) -> Iterator[tuple[str, ...]]:
     """Yield the places of the sections that may name a model or an FMU."""
-    for key in ("cable", "robot", "contact"):
+    for key in ("cable", "robot", "contact", "controller"):
         if key in document:
             yield (key,)
     components = document.get("components")
