@@ -1,7 +1,7 @@
-"""The contract between the FMUs, and whether a given FMU meets it, point by point.
+"""The contract between the FMUs, and whether a given FMU meets it, point by point, as far as it can be read.
 
 It is written here independently of our own modules, because it is what a foreign FMU has to meet;
-a test holds our modules against it.
+a test holds our modules against it. Whether an FMU does what its variables promise: `orchestrator.landing.trial`.
 """
 
 from __future__ import annotations
@@ -141,6 +141,8 @@ CONTACT = (
     _scalar("touch_time", "output", "s", False, INSIDE),
 )
 CONTRACTS = {"robot": ROBOT, "cable": CABLE, "contact": CONTACT}
+ANY = "any"
+"""What has no contract: it can be put on trial all the same (`orchestrator.landing.trial`)."""
 MOST_PORTS = 4
 BREAKS = ("missing", "wrong")
 """Verdicts with which a landing cannot run."""
@@ -171,19 +173,24 @@ def check_fmu(path: Path, kind: str | None = None) -> tuple[str, list[Finding]]:
 
     Parameters
     ----------
-    kind : ``robot``, ``cable`` or ``contact``; without it the contract that the FMU's variables suit best
+    kind : ``robot``, ``cable``, ``contact`` or ``any``; without it the contract that the FMU's variables suit best
     """
     description = vocabulary.description(path)
     known = vocabulary.of_fmu(path)
     kind = kind or best_contract(known)
-    if kind not in CONTRACTS:
-        raise InputError(f"{kind}: no such contract; choose one of {', '.join(CONTRACTS)}")
-    return kind, [*_capabilities(path, description), *check_variables(kind, known)]
+    if kind not in (*CONTRACTS, ANY):
+        raise InputError(f"{kind}: no such contract; choose one of {', '.join(CONTRACTS)}, {ANY}")
+    points = [] if kind == ANY else check_variables(kind, known)
+    return kind, [*_capabilities(path, description), *points]
 
 
 def best_contract(known: dict[str, Variable]) -> str:
-    """Return the contract of which `known` has the most variables."""
-    return max(CONTRACTS, key=lambda kind: sum(n in known for p in CONTRACTS[kind] for n in p.names(1)))
+    """Return the contract of which `known` has the most variables, ``any`` if it has none of its places and loads."""
+    counts = {
+        kind: sum(n in known for p in points if p.vector for n in p.names(1)) for kind, points in CONTRACTS.items()
+    }
+    best = max(counts, key=lambda kind: counts[kind])
+    return best if counts[best] else ANY
 
 
 def check_variables(kind: str, known: dict[str, Variable]) -> list[Finding]:
