@@ -5,7 +5,7 @@ from __future__ import annotations
 from collections.abc import Callable, Iterable, Mapping
 from dataclasses import dataclass
 from pathlib import Path
-from typing import Self
+from typing import Any, Self
 
 import numpy as np
 
@@ -117,7 +117,8 @@ class Bench:
 
     def fresh(self, parameters: Mapping[str, Value] | None = None) -> Fmu:
         """Return another instance, started."""
-        if self.fmu.description.coSimulation.canBeInstantiatedOnlyOncePerProcess:
+        interface: Any = self.fmu.description.coSimulation
+        if interface.canBeInstantiatedOnlyOncePerProcess:
             self.close()
             self.restores = False
         fmu = Fmu(self.path)

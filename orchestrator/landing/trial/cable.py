@@ -48,8 +48,8 @@ def cable_rows(bench: Bench) -> Iterator[Row]:
     two = pair(bench, cable_course(bench, 2))
     ports = [f"port[{k + 1}]" for k in range(n)]
     for name, rate in (("position", "velocity"), ("tangent", "tangent_rate")):
-        names = ([f"{port}.{what}" for port in ports] for what in (name, rate))
-        yield rate_of(two, *names, f"{rate} is the rate of {name}")
+        names, rates = ([f"{port}.{what}" for port in ports] for what in (name, rate))
+        yield rate_of(two, names, rates, f"{rate} is the rate of {name}")
     yield from means(two, motions(bench))
     yield _energy(bench)
 
@@ -165,7 +165,7 @@ def _energy(bench: Bench) -> Row:
     steps = 2 * STEPS
     motion = bench.run({"port[1].force.z": -FORCE}, steps * bench.H, steps)
     done = -FORCE * float(motion["port[1].position"][-1, 2] - motion["port[1].position"][0, 2])
-    energy = sum(motion[part] for part in parts)
+    energy = np.sum([motion[part] for part in parts], axis=0)
     gained = float(energy[-1] - energy[0])
     found = f"{gained:.5g} J of {done:.5g} J work"
     allowed = ACCURACY * abs(done) + 1e-12 * float(np.max(np.abs(energy)))

@@ -199,7 +199,7 @@ def _pushes(down: Press) -> Row:
 def _grows(down: Press, steps: int) -> Row:
     depth, force = down["penetration"][:steps], down["normal_force"][:steps]
     inside = depth > 0.0
-    rises = bool(np.all(np.diff(force[inside]) > 0.0)) and np.count_nonzero(inside) > 1
+    rises = bool(np.count_nonzero(inside) > 1 and np.all(np.diff(force[inside]) > 0.0))
     found = f"{force[inside][0]:.3g} to {force[inside][-1]:.3g} N" if np.any(inside) else "it never closes"
     return judged("stiffness", "the force grows with the penetration", "the contract", found, rises, "it does not grow")
 
