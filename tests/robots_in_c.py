@@ -52,8 +52,16 @@ FAULTS: dict[str, tuple[Change, ...]] = {
     "pitch down": (("robot.c", "body[10] = -asin(sine);", "body[10] = asin(sine);"),),
 }  # fmt: skip
 FAILS = "fails under load"
-FAILING = {FAILS: (("robot.c", LOADS, f"{LOADS} if (loads[4] != 0) loads[4] = NAN;"),)}
-"""A robot that gives up; no fault of its mechanics."""
+EXITS, HANGS = "leaves under load", "hangs under load"
+FAILING: dict[str, tuple[Change, ...]] = {
+    FAILS: (("robot.c", LOADS, f"{LOADS} if (loads[4] != 0) loads[4] = NAN;"),),
+    EXITS: (
+        ("robot.c", "#include <math.h>", "#include <math.h>\n#include <stdlib.h>"),
+        ("robot.c", LOADS, f"{LOADS} if (loads[4] != 0) exit(0);"),
+    ),
+    HANGS: (("robot.c", LOADS, f"{LOADS} while (loads[4] != 0) {{}}"),),
+}
+"""Robots that give up; no faults of their mechanics."""
 SILENT: tuple[Change, ...] = (
     ("modelDescription.xml", 'name="center_of_mass.', 'name="own.center_of_mass.'),
     ("modelDescription.xml", 'name="mass"', 'name="own.mass"'),

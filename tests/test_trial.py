@@ -20,7 +20,7 @@ from orchestrator.landing.trial.body import Body, Wrench
 from orchestrator.landing.trial.dynamic import Trial, put_on_trial
 from orchestrator.landing.trial.row import ACCURACY, deviation
 from tests.fmus import build, compiled, needs_compiler
-from tests.robots_in_c import FAILS, FAULTS, robot_in_c
+from tests.robots_in_c import EXITS, FAILS, FAULTS, HANGS, robot_in_c
 
 
 def failures(trial: Trial) -> dict[str, str]:
@@ -241,9 +241,10 @@ def test_wrong_input_ends_with_status_2(capsys, options, message) -> None:
 
 
 @needs_compiler
-def test_an_fmu_that_fails_on_trial_ends_with_status_3_and_what_was_found(capsys) -> None:
-    status, out, err = command(capsys, "check", "--run", robot_in_c(FAILS))
-    assert status == 3 and "start " in out and "it fails" not in out and "discard" in err
+@pytest.mark.parametrize(("how", "says"), [(FAILS, "discard"), (EXITS, "ended"), (HANGS, "no answer within 2 s")])
+def test_an_fmu_that_fails_on_trial_ends_with_status_3_and_what_was_found(capsys, how: str, says: str) -> None:
+    status, out, err = command(capsys, "check", "--run", "--timeout", 2, robot_in_c(how))
+    assert status == 3 and "free fall " in out and says in err
 
 
 def test_read_only_runs_nothing(capsys, monkeypatch: pytest.MonkeyPatch) -> None:

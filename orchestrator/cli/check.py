@@ -11,9 +11,12 @@ from orchestrator.cli import printing
 from orchestrator.cli.start import importing
 
 if TYPE_CHECKING:
+    from orchestrator.coupling.fmu.isolated import Limits
     from orchestrator.landing.trial.dynamic import Trial
     from orchestrator.landing.trial.row import Row
 
+PATIENCE = 300.0
+"""s; the first step of our own FMUs may compile for some minutes."""
 UNTESTED = {
     "robot": "whether it obeys forces and moments, falls, turns, and comes back to a saved state",
     "cable": "whether it rests, answers forces, and comes back to a saved state",
@@ -31,15 +34,18 @@ def check(
         bool, typer.Option("--run", help="Start and step it too: hold its answers against mechanics.")
     ] = False,
     macro_step: Annotated[float | None, typer.Option(help="Macro step of --run, s. Default: 5 ms, or its own.")] = None,
+    timeout: Annotated[float, typer.Option(help="Wall time that one call of it may take, s.")] = PATIENCE,
     json: Annotated[Path | None, typer.Option(metavar="FILE", help="Write the findings of --run to a file.")] = None,
     read_only: Annotated[bool, typer.Option("--read-only", help="Run no code of it: only read what it says.")] = False,
 ) -> None:
     """Check an FMU against a contract, point by point: that of a robot, a cable or a contact.
 
-    It is read, loaded and instantiated; with --run also stepped, and its answers are held against mechanics.
+    It is read, loaded and instantiated, in a process of its own; with --run also stepped, and its answers are held against
+    mechanics.
     """
     with importing():
         from orchestrator.coupling.errors import DONE, MISSED, InputError
+        from orchestrator.coupling.fmu.isolated import Limits
         from orchestrator.landing.contract import check_fmu, is_met
         from orchestrator.landing.trial.loading import loaded
 
@@ -49,7 +55,7 @@ def check(
         raise InputError(f"--macro-step {macro_step:g}: must be greater than 0")
     kind, findings = check_fmu(fmu, contract)
     if not read_only and is_met(findings[:2]):
-        findings.insert(2, loaded(fmu))
+        findings.insert(2, loaded(fmu, Limits(timeout)))
     printing.print_findings(kind, findings)
     met = is_met(findings)
     said = "can be checked" if kind == "any" else f"{'meets' if met else 'does not meet'} the {kind} contract"
@@ -57,16 +63,16 @@ def check(
     if not run:
         print(f"not tested: {UNTESTED[kind]}; `orchestrator check --run {fmu}` does")
         raise typer.Exit(DONE if met else MISSED)
-    raise typer.Exit(_tried(fmu, kind, macro_step, json) if met else MISSED)
+    raise typer.Exit(_tried(fmu, kind, macro_step, Limits(timeout), json) if met else MISSED)
 
 
-def _tried(fmu: Path, kind: str, macro_step: float | None, json: Path | None) -> int:
+def _tried(fmu: Path, kind: str, macro_step: float | None, limits: Limits, json: Path | None) -> int:
     """Put the FMU on trial, say what came of it, and return the exit status."""
     from orchestrator.coupling.errors import DONE, FAILED, MISSED
     from orchestrator.coupling.run.results import write_json
     from orchestrator.landing.trial.dynamic import put_on_trial
 
-    trial = put_on_trial(fmu, kind, macro_step)
+    trial = put_on_trial(fmu, kind, macro_step, limits)
     _print(trial)
     if json is not None:
         write_json(json, {"fmu": str(fmu), **trial.content()})

@@ -14,12 +14,14 @@ from orchestrator.coupling.fmu.binding import SavedState
 from orchestrator.coupling.fmu.description import Value
 from orchestrator.coupling.fmu.failure import FmuError
 from orchestrator.coupling.fmu.instance import Fmu
+from orchestrator.coupling.fmu.isolated import Limits
 from orchestrator.coupling.stepping.replay import REPLAY
 
 MACRO_STEP = 5e-3
 """s; that of the shipped landings."""
 Loads = Mapping[str, float]
 """Input → its value, held over an experiment."""
+Isolation = bool | Limits
 Course = Callable[[float, float], Loads]
 """From start and length of a step (s) to the inputs of that step."""
 
@@ -59,6 +61,7 @@ class Bench:
     parameters : start values, parameters and inputs
     macro_step : s; without it that of the FMU's own step, where it is fixed, else `MACRO_STEP`
     driven : inputs that experiments set, those that it does not name to 0; the others keep their start values
+    isolate : whether each instance lives in a process of its own, and within which limits
 
     Attributes
     ----------
@@ -73,9 +76,10 @@ class Bench:
         parameters: Mapping[str, Value] | None = None,
         macro_step: float | None = None,
         driven: Iterable[str] = (),
+        isolate: Isolation = False,
     ) -> None:
-        self.path, self.parameters = path, dict(parameters or {})
-        self.fmu = Fmu(path)
+        self.path, self.parameters, self.isolate = path, dict(parameters or {}), isolate
+        self.fmu = Fmu(path, isolate=isolate)
         self.start: SavedState | None = None
         self.H = macro_step or own_step(self.fmu) or MACRO_STEP
         self.driven = [name for name in driven if name in self.fmu.ports]
@@ -121,7 +125,7 @@ class Bench:
         if interface.canBeInstantiatedOnlyOncePerProcess:
             self.close()
             self.restores = False
-        fmu = Fmu(self.path)
+        fmu = Fmu(self.path, isolate=self.isolate)
         try:
             self._start(fmu, parameters)
         except BaseException:

@@ -11,7 +11,7 @@ import numpy as np
 from orchestrator.coupling.errors import InputError
 from orchestrator.coupling.fmu.instance import Fmu
 from orchestrator.landing.contract import CABLE, MOST_PORTS
-from orchestrator.landing.trial.bench import Bench, Course, Motion, held
+from orchestrator.landing.trial.bench import Bench, Course, Isolation, Motion, held
 from orchestrator.landing.trial.means import means, motions, pair, rate_of
 from orchestrator.landing.trial.row import ACCURACY, Row, deviation, judged, untestable
 
@@ -24,9 +24,9 @@ STEPS = 20
 REST = "equilibrium"
 
 
-def bench_of(path: Path, macro_step: float | None = None) -> Bench:
+def bench_of(path: Path, macro_step: float | None = None, isolate: Isolation = False) -> Bench:
     """Return a bench on which a cable hangs at rest, its ports within the span."""
-    with Fmu(path) as fmu:
+    with Fmu(path, isolate=isolate) as fmu:
         names = ("unstretched_length", "span")
         length = next((float(fmu.read(name)) for name in names if name in fmu.ports), 0.0)
         n = sum(f"port[{k + 1}].s" in fmu.ports for k in range(MOST_PORTS))
@@ -36,7 +36,7 @@ def bench_of(path: Path, macro_step: float | None = None) -> Bench:
         )
     start = {f"port[{k + 1}].s": PLACES[k] * length for k in range(n)}
     driven = (name for point in CABLE if point.causality == "input" for k in range(n) for name in point.names(k + 1))
-    return Bench(path, start, macro_step, (name for name in driven if not name.endswith(".s")))
+    return Bench(path, start, macro_step, (name for name in driven if not name.endswith(".s")), isolate)
 
 
 def cable_rows(bench: Bench) -> Iterator[Row]:

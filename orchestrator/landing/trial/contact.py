@@ -16,7 +16,7 @@ from orchestrator.coupling.fmu.description import Value
 from orchestrator.coupling.fmu.failure import FmuError
 from orchestrator.coupling.fmu.instance import Fmu
 from orchestrator.landing.contract import CONTACT
-from orchestrator.landing.trial.bench import Bench, Course
+from orchestrator.landing.trial.bench import Bench, Course, Isolation
 from orchestrator.landing.trial.row import ACCURACY, Row, deviation, judged, vector
 
 HIGH = 0.5
@@ -45,30 +45,30 @@ def inputs_at(height: float, along: float, s: float, speed: tuple[float, float] 
     }
 
 
-def bench_of(path: Path, macro_step: float | None = None) -> Bench:
+def bench_of(path: Path, macro_step: float | None = None, isolate: Isolation = False) -> Bench:
     """Return a bench on which the wheel is a little above the cable."""
-    height = touching(path)
+    height = touching(path, isolate)
     driven = [name for point in CONTACT if point.causality == "input" for name in point.names(1)]
-    with Fmu(path) as fmu:
+    with Fmu(path, isolate=isolate) as fmu:
         known = set(fmu.ports)
     start: dict[str, Value] = {k: v for k, v in inputs_at(height + GAP, 0.0, 0.0).items() if k in known}
-    return Bench(path, start, macro_step, driven)
+    return Bench(path, start, macro_step, driven, isolate)
 
 
-def touching(path: Path) -> float:
+def touching(path: Path, isolate: Isolation = False) -> float:
     """Return the height of the wheel (m) at which it begins to touch, by the gap that the contact shows."""
-    h, gap = HIGH, _gap(path, HIGH)
+    h, gap = HIGH, _gap(path, HIGH, isolate)
     if gap <= 0.0:
         raise RunError(
             f"{path}: penetration is {-gap:g} m with wheel and cable {HIGH:g} m apart; negative ones are gaps"
         )
     lower = h - gap  # never too low: a wall is not steeper than the way to it
-    slope = (gap - _gap(path, lower)) / (h - lower)
+    slope = (gap - _gap(path, lower, isolate)) / (h - lower)
     return h - gap / slope if slope > 0.0 else lower
 
 
-def _gap(path: Path, height: float) -> float:
-    with Fmu(path) as fmu:
+def _gap(path: Path, height: float, isolate: Isolation) -> float:
+    with Fmu(path, isolate=isolate) as fmu:
         fmu.set_parameters({k: v for k, v in inputs_at(height, 0.0, 0.0).items() if k in fmu.ports})
         fmu.enter_initialization(0.0)
         fmu.exit_initialization()

@@ -11,7 +11,7 @@ from orchestrator.coupling.errors import InputError, RunError
 from orchestrator.coupling.fmu.failure import FmuEnd, FmuError
 from orchestrator.landing.trial import cable, contact, robot
 from orchestrator.landing.trial.answers import wheels
-from orchestrator.landing.trial.bench import Bench, Course, held
+from orchestrator.landing.trial.bench import Bench, Course, Isolation, held
 from orchestrator.landing.trial.general import STEPS, general_rows
 from orchestrator.landing.trial.masters import macro_step_row, masters_row
 from orchestrator.landing.trial.means import means, motions, pair
@@ -52,13 +52,14 @@ class Trial:
         }
 
 
-def put_on_trial(path: Path, kind: str, macro_step: float | None = None) -> Trial:
+def put_on_trial(path: Path, kind: str, macro_step: float | None = None, isolate: Isolation = False) -> Trial:
     """Start the FMU at `path`, load and step it, and return what its answers say.
 
     Parameters
     ----------
     kind : the contract that it meets as far as it can be read; ``any`` for none
     macro_step : s; its own, or 5 ms, if none is given
+    isolate : whether each instance lives in a process of its own, and within which limits
 
     Raises
     ------
@@ -67,7 +68,7 @@ def put_on_trial(path: Path, kind: str, macro_step: float | None = None) -> Tria
     """
     trial = Trial(kind)
     try:
-        with _bench(path, kind, macro_step) as bench:
+        with _bench(path, kind, macro_step, isolate) as bench:
             trial.macro_step = bench.H
             _fill(trial, bench)
     except ValueError as error:
@@ -81,14 +82,14 @@ def put_on_trial(path: Path, kind: str, macro_step: float | None = None) -> Tria
     return trial
 
 
-def _bench(path: Path, kind: str, macro_step: float | None) -> Bench:
+def _bench(path: Path, kind: str, macro_step: float | None, isolate: Isolation) -> Bench:
     if kind == "robot":
-        return robot.bench_of(path, macro_step)
+        return robot.bench_of(path, macro_step, isolate)
     if kind == "cable":
-        return cable.bench_of(path, macro_step)
+        return cable.bench_of(path, macro_step, isolate)
     if kind == "contact":
-        return contact.bench_of(path, macro_step)
-    return Bench(path, None, macro_step)
+        return contact.bench_of(path, macro_step, isolate)
+    return Bench(path, None, macro_step, (), isolate)
 
 
 def _fill(trial: Trial, bench: Bench) -> None:

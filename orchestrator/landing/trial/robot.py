@@ -20,7 +20,7 @@ from orchestrator.landing.trial.answers import (
     stance,
     wheels,
 )
-from orchestrator.landing.trial.bench import Bench, held
+from orchestrator.landing.trial.bench import Bench, Isolation, held
 from orchestrator.landing.trial.body import Body, Wrench
 from orchestrator.landing.trial.falling import falling, holds_itself, starts, up_to_date
 from orchestrator.landing.trial.means import means, motions, pair
@@ -36,13 +36,13 @@ FROM_PARAMETERS = "Newton–Euler with the mass, centre of mass and inertia that
 FROM_ANSWERS = "Newton–Euler with the mass, centre of mass and inertia found from its own answers"
 
 
-def bench_of(path: Path, macro_step: float | None = None) -> Bench:
+def bench_of(path: Path, macro_step: float | None = None, isolate: Isolation = False) -> Bench:
     """Return a bench on which a robot starts turned, with nothing applied."""
     names = (name for point in ROBOT if point.causality == "input" for k in range(1, 5) for name in point.names(k))
     from orchestrator.catalogue.modules import of_fmu
 
     start = {name: value for name, value in START.items() if name in of_fmu(path)}
-    return Bench(path, start, macro_step, dict.fromkeys(names))
+    return Bench(path, start, macro_step, dict.fromkeys(names), isolate)
 
 
 def robot_rows(bench: Bench) -> Iterator[Row]:
