@@ -7,6 +7,8 @@ from dataclasses import replace
 from functools import cache
 from itertools import pairwise
 from pathlib import Path
+from types import SimpleNamespace
+from typing import Any, cast
 
 import numpy as np
 import pytest
@@ -14,11 +16,13 @@ import pytest
 from orchestrator.catalogue.library import module_fmu, robot_fmu
 from orchestrator.catalogue.robot_spec import catalogue, load_robot
 from orchestrator.cli import commands as cli
+from orchestrator.coupling.fmu.description import sha256_of
 from orchestrator.landing.trial import contact as contacts
 from orchestrator.landing.trial.answers import attitude
 from orchestrator.landing.trial.body import Body, Wrench
 from orchestrator.landing.trial.dynamic import Trial, put_on_trial
 from orchestrator.landing.trial.row import ACCURACY, deviation
+from orchestrator.runs.systems import LandingSystem
 from tests.fmus import build, compiled, needs_compiler
 from tests.robots_in_c import EXITS, FAILS, FAULTS, HANGS, robot_in_c
 
@@ -245,6 +249,25 @@ def test_wrong_input_ends_with_status_2(capsys, options, message) -> None:
 def test_an_fmu_that_fails_on_trial_ends_with_status_3_and_what_was_found(capsys, how: str, says: str) -> None:
     status, out, err = command(capsys, "check", "--run", "--timeout", 2, robot_in_c(how))
     assert status == 3 and "free fall " in out and says in err
+
+
+@needs_compiler
+def test_a_landing_knows_what_became_of_its_foreign_robot(
+    capsys, tmp_path: Path, monkeypatch: pytest.MonkeyPatch
+) -> None:
+    monkeypatch.setenv("LINE_LANDING_CACHE", str(tmp_path))
+    ours, right, wrong = None, robot_in_c(), robot_in_c("moments ignored")
+
+    def notes(robot: Path | None) -> list[str]:
+        parts = {name: SimpleNamespace(foreign=None) for name in ("cable", "contact")}
+        landing = SimpleNamespace(**parts, robot=SimpleNamespace(foreign=robot))
+        graph: Any = SimpleNamespace(components={"robot": SimpleNamespace(sha256=sha256_of(robot))} if robot else {})
+        return list(LandingSystem._untried(cast(LandingSystem, SimpleNamespace(landing=landing)), graph))
+
+    assert notes(ours) == [] and ["check --run" in note for note in notes(right)] == [True]
+    for robot in (right, wrong):
+        command(capsys, "check", "--run", robot)
+    assert notes(right) == [] and "wheel[1].moment.x acts" in notes(wrong)[0]
 
 
 def test_read_only_runs_nothing(capsys, monkeypatch: pytest.MonkeyPatch) -> None:

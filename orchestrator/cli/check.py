@@ -69,18 +69,21 @@ def check(
 def _tried(fmu: Path, kind: str, macro_step: float | None, limits: Limits, json: Path | None) -> int:
     """Put the FMU on trial, say what came of it, and return the exit status."""
     from orchestrator.coupling.errors import DONE, FAILED, MISSED
+    from orchestrator.coupling.fmu.description import sha256_of
     from orchestrator.coupling.run.results import write_json
     from orchestrator.landing.trial.dynamic import put_on_trial
+    from orchestrator.landing.trial.remembered import remember
 
     trial = put_on_trial(fmu, kind, macro_step, limits)
+    failed = [row.name for row in trial.rows if row.verdict == "FAIL"]
+    remember(sha256_of(fmu), kind, [*failed, trial.failure] if trial.failure else failed)
     _print(trial)
     if json is not None:
         write_json(json, {"fmu": str(fmu), **trial.content()})
     if trial.failure:
         printing.complain(trial.failure)
         return FAILED
-    failed = sum(row.verdict == "FAIL" for row in trial.rows)
-    print(f"{fmu}: {'passes' if trial.passed else f'{failed} of {len(trial.rows)} findings fail'}")
+    print(f"{fmu}: {'passes' if trial.passed else f'{len(failed)} of {len(trial.rows)} findings fail'}")
     return DONE if trial.passed else MISSED
 
 
