@@ -58,8 +58,12 @@ def check(
         findings.insert(2, loaded(fmu, Limits(timeout)))
     printing.print_findings(kind, findings)
     met = is_met(findings)
-    said = "can be checked" if kind == "any" else f"{'meets' if met else 'does not meet'} the {kind} contract"
-    print(f"{fmu}: {said} as far as it can be read")
+    said = (
+        "has no contract, and can be tried"
+        if kind == "any"
+        else f"{'meets' if met else 'does not meet'} the {kind} contract"
+    )
+    print(f"{fmu}: {said}{'' if kind == 'any' else ' as far as it can be read'}")
     if not run:
         print(f"not tested: {UNTESTED[kind]}; `orchestrator check --run {fmu}` does")
         raise typer.Exit(DONE if met else MISSED)
