@@ -41,6 +41,7 @@ from orchestrator.coupling.fmu.failure import CRASHED, NOT_FINITE, FmuEnd, FmuEr
 from orchestrator.coupling.fmu.group import Group
 from orchestrator.coupling.fmu.isolated import Isolated, Limits
 from orchestrator.coupling.fmu.messages import Messages, gist
+from orchestrator.coupling.fmu.nursery import POSSIBLE
 from orchestrator.coupling.fmu.python_modules import own_modules
 from orchestrator.coupling.fmu.saved_states import SavedStates
 from orchestrator.coupling.fmu.unzipped import unzip
@@ -104,8 +105,12 @@ class Fmu:
         self._begun: tuple[float, float, bool] | None = None
         self.stop = np.nan
         self.worst, self.initialized = 0, False
-        self.abandoned, self.fate = False, None
+        self.abandoned = False
+        self.fate: tuple[int, str] | None = None
         self.limits = isolate if isinstance(isolate, Limits) else Limits() if isolate else None
+        if self.limits and not POSSIBLE:
+            self.limits = None
+            self.log.add(WARNING, "there are no processes for FMUs on this system: it lives in ours")
         _require_possible(self)
         try:
             self.folder = unzip(self.path, self.sha256)
