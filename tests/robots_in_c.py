@@ -23,6 +23,11 @@ LATE = (
     + "memcpy(m->robot.value + BODY, m->robot.late + BODY, sizeof now - BODY * sizeof(double)); "
     "memcpy(m->robot.late, now, sizeof now); return ok ? fmi2OK : fmi2Error;"
 )
+STALE = (
+    "double now[2 * N_LOADS]; memcpy(now, m->robot.value + LOADS, sizeof now); "
+    "memcpy(m->robot.value + LOADS, m->robot.late, sizeof now); int ok = robot_step(&m->robot, H); "
+    "memcpy(m->robot.value + LOADS, now, sizeof now); memcpy(m->robot.late, now, sizeof now); return ok ? fmi2OK : fmi2Error;"
+)
 FAULTS: dict[str, tuple[Change, ...]] = {
     "wrong sign": (("robot.c", LOADS, f"{LOADS} loads[4] = -loads[4];"),),
     "one axis ignored": (("robot.c", LOADS, f"{LOADS} loads[5] = 0;"),),
@@ -36,6 +41,10 @@ FAULTS: dict[str, tuple[Change, ...]] = {
         ("robot.h", "double time; ", "double late[N_VARIABLES]; double time; "),
         ("fmi2.c", "m->running = 1;", "m->running = 1; memcpy(m->robot.late, m->robot.value, sizeof m->robot.value);"),
         ("fmi2.c", 'return robot_step(&m->robot, H) ? fmi2OK : fail(m, fmi2Discard, "the motion is no longer finite");', LATE),
+    ),
+    "late loads": (
+        ("robot.h", "double time; ", "double late[2 * N_LOADS]; double time; "),
+        ("fmi2.c", 'return robot_step(&m->robot, H) ? fmi2OK : fail(m, fmi2Discard, "the motion is no longer finite");', STALE),
     ),
     "wrong mean": (("robot.c", "wheel[i] = i / 3 == 2", "wheel[i] = i < 3 ? wheel[i - 12] : i / 3 == 2"),),
     "rotation in one step only": (("robot.c", "? sums[i] : sums[i] / H", "? 0.5 * sums[i] : sums[i] / H"),),

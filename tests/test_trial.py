@@ -96,6 +96,7 @@ EXPECTED: dict[str, tuple[set[str], str, str]] = {
     ),
     "body's frame": (ALL_LOADS | {"work is energy"}, "wheel[1].moment.y acts", "taken in the body's frame"),
     "old outputs": ({"outputs of the step"}, "outputs of the step", "the step before"),
+    "late loads": (ALL_LOADS, "wheel[1].force.x acts", "a step late"),
     "wrong mean": ({"wheel[k].position_mean"}, "wheel[k].position_mean", "the value at the end of the step"),
     "rotation in one step only": ({"wheel[k].rotation"}, "wheel[k].rotation", "something else"),
     "state forgotten": ({"state replay"}, "state replay", "does not come back"),

@@ -26,6 +26,7 @@ from orchestrator.landing.trial.body import Body, Wrench
 from orchestrator.landing.trial.row import Deviation, Row, deviation, judged, untestable, vector
 
 UNITS = {"force": "N", "moment": "N.m"}
+LATE = "it acts a step late: the robot takes the inputs of the step before"
 BRISK = 10.0
 """m/s²; what a load with a slope does to the robot at the ends of a step."""
 
@@ -71,9 +72,8 @@ def single_loads(judge: Judge) -> Iterator[Row]:
 def _single(judge: Judge, load: LoadName, answer: Answer) -> Row:
     name, found = f"{input_of(load)} acts", _said(judge, load, answer.rate)
     if _is_nothing(judge, load, answer):
-        return judged(
-            name, "the robot moves", "Newton–Euler", "nothing moves", False, "it has no effect: it is ignored"
-        )
+        why = LATE if np.any(answer.estimate > np.abs(answer.rate) + NOTHING) else "it has no effect: it is ignored"
+        return judged(name, "the robot moves", "Newton–Euler", "nothing moves in the first step", False, why)
     if judge.body is None:
         good = float(_at_place(judge, load, answer.rate)[load[2]]) > 0.0
         return judged(

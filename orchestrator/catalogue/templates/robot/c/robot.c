@@ -111,8 +111,10 @@ static void show(Robot *r) {
 int robot_start(Robot *r) {
     double J[9], R[9], arm[3], b[3];
     const double *a = r->value + START_ANGLES;
-    double cr = cos(a[0] / 2), sr = sin(a[0] / 2), cp = cos(a[1] / 2), sp = sin(a[1] / 2), cy = cos(a[2] / 2), sy = sin(a[2] / 2);
-    double q[4] = {cr * cp * cy + sr * sp * sy, sr * cp * cy - cr * sp * sy, cr * sp * cy + sr * cp * sy, cr * cp * sy - sr * sp * cy};
+    double cr = cos(a[0] / 2), cp = cos(a[1] / 2), cy = cos(a[2] / 2);
+    double sr = sin(a[0] / 2), sp = sin(a[1] / 2), sy = sin(a[2] / 2);
+    double q[4] = {cr * cp * cy + sr * sp * sy, sr * cp * cy - cr * sp * sy,
+                   cr * sp * cy + sr * cp * sy, cr * cp * sy - sr * sp * cy};
     inertia(r, J);
     if (!(r->value[MASS] > 0) || !invert(J, r->inverse_inertia)) return 0;
     memcpy(r->state + 3, q, sizeof q);

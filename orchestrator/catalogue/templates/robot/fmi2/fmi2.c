@@ -45,8 +45,8 @@ static fmi2Status fail(Instance *m, fmi2Status status, const char *message) {
 
 API fmi2String fmi2GetVersion(void) { return "2.0"; }
 API fmi2String fmi2GetTypesPlatform(void) { return "default"; }
-API fmi2Component fmi2Instantiate(fmi2String name, int type, fmi2String guid, fmi2String place, const fmi2CallbackFunctions *callbacks,
-                                  fmi2Boolean visible, fmi2Boolean logging) {
+API fmi2Component fmi2Instantiate(fmi2String name, int type, fmi2String guid, fmi2String place,
+                                  const fmi2CallbackFunctions *callbacks, fmi2Boolean visible, fmi2Boolean logging) {
     Instance *m = calloc(1, sizeof *m);
     (void)type, (void)guid, (void)place, (void)visible, (void)logging;
     if (!m) return NULL;
@@ -56,7 +56,8 @@ API fmi2Component fmi2Instantiate(fmi2String name, int type, fmi2String guid, fm
     return m;
 }
 API void fmi2FreeInstance(fmi2Component c) { free(c); }
-API fmi2Status fmi2SetupExperiment(fmi2Component c, fmi2Boolean t, fmi2Real tolerance, fmi2Real start, fmi2Boolean s, fmi2Real stop) {
+API fmi2Status fmi2SetupExperiment(fmi2Component c, fmi2Boolean t, fmi2Real tolerance, fmi2Real start, fmi2Boolean s,
+                                    fmi2Real stop) {
     (void)c, (void)t, (void)tolerance, (void)start, (void)s, (void)stop;
     return fmi2OK;
 }

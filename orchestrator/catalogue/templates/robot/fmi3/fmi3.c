@@ -55,8 +55,8 @@ API fmi3Instance fmi3InstantiateCoSimulation(fmi3String name, fmi3String token, 
 API fmi3Instance fmi3InstantiateModelExchange(void) { return NULL; }
 API fmi3Instance fmi3InstantiateScheduledExecution(void) { return NULL; }
 API void fmi3FreeInstance(fmi3Instance c) { free(c); }
-API fmi3Status fmi3EnterInitializationMode(fmi3Instance c, fmi3Boolean t, fmi3Float64 tolerance, fmi3Float64 start, fmi3Boolean s,
-                                           fmi3Float64 stop) {
+API fmi3Status fmi3EnterInitializationMode(fmi3Instance c, fmi3Boolean t, fmi3Float64 tolerance, fmi3Float64 start,
+                                           fmi3Boolean s, fmi3Float64 stop) {
     (void)t, (void)tolerance, (void)s, (void)stop;
     ((Instance *)c)->robot.time = start;
     return fmi3OK;
@@ -91,7 +91,8 @@ API fmi3Status fmi3GetFloat64(fmi3Instance c, const fmi3ValueReference vr[], siz
     }
     return fmi3OK;
 }
-API fmi3Status fmi3SetFloat64(fmi3Instance c, const fmi3ValueReference vr[], size_t n, const fmi3Float64 values[], size_t size) {
+API fmi3Status fmi3SetFloat64(fmi3Instance c, const fmi3ValueReference vr[], size_t n, const fmi3Float64 values[],
+                              size_t size) {
     (void)size;
     Instance *m = c;
     for (size_t i = 0; i < n; i++) {

@@ -1,8 +1,8 @@
 """TITLE: a rigid robot for landings on a line, as an FMU (FMI 2.0, co-simulation, pythonfmu).
 
 State: position of the centre of mass G, attitude (a quaternion w, x, y, z), velocity of G, angular velocity; all inertial.
-Loads within a macro step [t, t + H] are `load + load_rate (tau - t - H/2)`. Beside the state, four integrals a wheel are carried
-along, of its position, axle, angular velocity, and of the angle turned: what means and rotations of the step are made of.
+Loads within a macro step [t, t + H] are `load + load_rate (tau - t - H/2)`. Beside the state, four integrals a wheel are
+carried along, of its position, axle, angular velocity, and of the angle turned: what means and rotations are made of.
 """
 
 import pickle
