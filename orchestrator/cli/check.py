@@ -28,7 +28,7 @@ UNTESTED = {
 def check(
     fmu: Annotated[Path, typer.Argument(metavar="FILE.fmu", help="The FMU.")],
     contract: Annotated[
-        str | None, typer.Option(help="robot, cable, contact or any. Default: the one it suits best.")
+        str | None, typer.Option(help="robot, cable, contact, controller or any. Default: the one it suits best.")
     ] = None,
     run: Annotated[
         bool, typer.Option("--run", help="Start and step it too: hold its answers against mechanics.")
@@ -65,7 +65,7 @@ def check(
     )
     print(f"{fmu}: {said}{'' if kind == 'any' else ' as far as it can be read'}")
     if not run:
-        print(f"not tested: {UNTESTED[kind]}; `orchestrator check --run {fmu}` does")
+        print(f"not tested: {UNTESTED.get(kind, UNTESTED['any'])}; `orchestrator check --run {fmu}` does")
         raise typer.Exit(DONE if met else MISSED)
     raise typer.Exit(_tried(fmu, kind, macro_step, Limits(timeout), json) if met else MISSED)
 

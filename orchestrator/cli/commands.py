@@ -18,6 +18,7 @@ from typer.core import TyperGroup
 import orchestrator
 from orchestrator.cli import modes, new, options, printing
 from orchestrator.cli.check import check
+from orchestrator.cli.export import export
 from orchestrator.cli.identify import identify
 from orchestrator.cli.start import importing
 from orchestrator.cli.sweep import sweep
@@ -274,6 +275,7 @@ def reproduce(
     raise typer.Exit(done.exit_status)
 
 
+app.command()(export)
 app.command()(identify)
 app.command()(sweep)
 

@@ -140,9 +140,24 @@ CONTACT = (
     _scalar("impulse", "output", "N.s", False, INSIDE),
     _scalar("touch_time", "output", "s", False, INSIDE),
 )
-CONTRACTS = {"robot": ROBOT, "cable": CABLE, "contact": CONTACT}
+CONTROLLER = (
+    _scalar("thrust", "output", "N", use="along z_B, into the robot's input of that name"),
+    Point("torque", "output", "N.m", False, use="to turn the robot, components in B"),
+    Point("body.position", "input", "m", False, use="where the robot is"),
+    Point("body.velocity", "input", "m/s", False, use="how fast it goes"),
+    Point("body.angular_velocity", "input", "rad/s", False, use="how fast it turns"),
+    _scalar("roll", "input", "rad", False, "how it is turned"),
+    _scalar("pitch", "input", "rad", False, "how it is turned"),
+    _scalar("yaw", "input", "rad", False, "how it is turned"),
+    _scalar("contact[k].normal_force", "input", "N", False, "to feel the line"),
+    _scalar("sample_time", "parameter", "s", False, "if it samples: macro steps have to divide it"),
+)
+"""Of its inputs it has those that it needs: any output of the robot by its name, any of contact k as ``contact[k].NAME``."""
+CONTRACTS = {"robot": ROBOT, "cable": CABLE, "contact": CONTACT, "controller": CONTROLLER}
 ANY = "any"
 """What has no contract: it can be put on trial all the same (`orchestrator.landing.trial`)."""
+FEWEST = 2
+"""Variables that an FMU shares at least with the contract that it is held against; one may be so named by chance."""
 MOST_PORTS = 4
 BREAKS = ("missing", "wrong")
 """Verdicts with which a landing cannot run."""
@@ -155,7 +170,7 @@ def is_control(name: str) -> bool:
 
 def is_unused(name: str, wheels: int) -> bool:
     """Return whether a variable is that of a port beyond the last of the `wheels`."""
-    number = re.match(r"(?:port|wheel)\[(\d+)\]", name)
+    number = re.match(r"(?:port|wheel|contact)\[(\d+)\]", name)
     return bool(number and 0 < wheels < int(number[1]))
 
 
@@ -173,7 +188,7 @@ def check_fmu(path: Path, kind: str | None = None) -> tuple[str, list[Finding]]:
 
     Parameters
     ----------
-    kind : ``robot``, ``cable``, ``contact`` or ``any``; without it the contract that the FMU's variables suit best
+    kind : ``robot``, ``cable``, ``contact``, ``controller`` or ``any``; without it the contract that its variables suit best
     """
     description = vocabulary.description(path)
     known = vocabulary.of_fmu(path)
@@ -185,12 +200,14 @@ def check_fmu(path: Path, kind: str | None = None) -> tuple[str, list[Finding]]:
 
 
 def best_contract(known: dict[str, Variable]) -> str:
-    """Return the contract of which `known` has the most variables, ``any`` if it has none of its places and loads."""
-    counts = {
-        kind: sum(n in known for p in points if p.vector for n in p.names(1)) for kind, points in CONTRACTS.items()
-    }
-    best = max(counts, key=lambda kind: counts[kind])
-    return best if counts[best] else ANY
+    """Return the contract of which `known` has the most variables, each an input, output or parameter as there; or `ANY`."""
+
+    def alike(kind: str) -> int:
+        names = ((n, p.causality) for p in CONTRACTS[kind] for n in p.names(1))
+        return sum(n in known and known[n].causality == causality for n, causality in names)
+
+    best = max(CONTRACTS, key=alike)
+    return best if alike(best) >= FEWEST else ANY
 
 
 def check_variables(kind: str, known: dict[str, Variable]) -> list[Finding]:

@@ -94,7 +94,7 @@ def _bench(path: Path, kind: str, macro_step: float | None, isolate: Isolation) 
 
 def _fill(trial: Trial, bench: Bench) -> None:
     """Add the findings one by one, so that those before a failure are kept."""
-    for row in ROWS[trial.kind](bench):
+    for row in ROWS.get(trial.kind, any_rows)(bench):
         trial.rows.append(row)
     course = _course(trial.kind, bench)
     for row in general_rows(bench, course):
