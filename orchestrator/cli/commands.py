@@ -1,7 +1,7 @@
 """The command line. Progress and errors go to stderr, answers to stdout.
 
 Exit status: 0 done and within tolerance; 1 done, but a tolerance or a safety limit is missed; 2 wrong input;
-3 the run failed; 130 interrupted. What is heavy is imported where it is used, so that ``--help`` is quick.
+3 the run failed; 130 interrupted; 128 + the number of another signal that has ended it. What is heavy is imported where it is used, so that ``--help`` is quick.
 """
 
 from __future__ import annotations
@@ -20,6 +20,7 @@ from orchestrator.cli import modes, new, options, printing
 from orchestrator.cli.identify import identify
 from orchestrator.cli.start import importing
 from orchestrator.cli.sweep import sweep
+from orchestrator.coupling.signals import Stopped, ending
 
 
 class Commands(TyperGroup):
@@ -31,7 +32,7 @@ class Commands(TyperGroup):
         warnings.showwarning = lambda message, *_: printing.complain(str(message))
         try:
             return super().invoke(ctx)
-        except (Exception, KeyboardInterrupt) as error:
+        except (Exception, KeyboardInterrupt, Stopped) as error:
             status = _explained(error)
             if status is None:
                 raise
@@ -40,12 +41,15 @@ class Commands(TyperGroup):
 
 def _explained(error: BaseException) -> int | None:
     """Say on stderr what ended a command and return its exit status; None where that is for others to say."""
-    from orchestrator.coupling.errors import FAILED, INTERRUPTED, OrchestratorError
+    from orchestrator.coupling.errors import FAILED, INTERRUPTED, SIGNALLED, OrchestratorError
 
     if isinstance(error, OrchestratorError):
         for line in str(error).splitlines():
             printing.complain(line)
         return error.exit_status
+    if isinstance(error, Stopped):
+        printing.complain(str(error))
+        return SIGNALLED + error.number
     if isinstance(error, KeyboardInterrupt):
         printing.complain("interrupted")
         return INTERRUPTED
@@ -291,13 +295,18 @@ app.command()(sweep)
 
 @app.command()
 def report(
-    directory: Annotated[Path, typer.Argument(metavar="DIR", help="Directory of a finished run.")],
+    directory: Annotated[Path, typer.Argument(metavar="DIR", help="Directory of a run.")],
 ) -> None:
-    """Draw pictures and a page of finished results."""
+    """Draw pictures and a page of results: of a finished run, or of what an unfinished one has left so far."""
     with importing():
+        from orchestrator.coupling.run.results import read_json
         from orchestrator.report.page import report as make
 
-    print(make(directory))
+    page = make(directory)
+    manifest = page.parent / "manifest.json"
+    if manifest.is_file() and (error := read_json(manifest)["error"]) is not None:
+        printing.complain(f"{page.parent}: {error}")
+    print(page)
 
 
 def _numbers(text: str | None) -> list[float]:
@@ -318,7 +327,8 @@ def main(arguments: list[str] | None = None) -> None:
     """Run the command line and end the process with its exit status."""
     printing.forgive_encodings()
     try:
-        app(arguments)
+        with ending():
+            app(arguments)
     except SystemExit as end:
         if _left_behind():
             from orchestrator.coupling.errors import FAILED

@@ -16,7 +16,6 @@ from orchestrator.coupling.run.columns import Columns, Rows
 from orchestrator.coupling.run.results import Table
 from orchestrator.coupling.run.steps import KINDS, NAMES, POWER, Steps
 
-
 WORK, RESIDUAL = "work ", "residual "
 """Begin the names of a load's columns in the rows of a log."""
 
@@ -58,6 +57,14 @@ class Log:
     def time(self) -> np.ndarray:
         """The communication points that are recorded, (n + 1,) s, the start included."""
         return self.rows.column("time")
+
+    @property
+    def points(self) -> np.ndarray:
+        """All communication points, recorded or not, (steps + 1,) s."""
+        if self.every == 1:
+            return self.time
+        first, last = self.rows.row(0)[0], self.rows.row(-1)[0]
+        return np.append(first + self.macro_step * np.arange(len(self.reports)), last)
 
     @property
     def values(self) -> np.ndarray:

@@ -119,7 +119,11 @@ class _Simulation:
     ):
         self.graph, self.master, self.recorder, self.on_step = graph, master, recorder, on_step
         self.start, self.stop, self.n, self.H = grid
-        self.made, self.abandoned, self.pending = 0, False, False  # steps; whether the row of the last one is not yet added
+        self.made, self.abandoned, self.pending = (
+            0,
+            False,
+            False,
+        )  # steps; whether the row of the last one is not yet added
         self.failure: BaseException | None = None
         self.work = Work(graph)
         self.residual = np.zeros(len(self.work.names))

@@ -1,0 +1,71 @@
+"""What a run leaves on disk while it is going on.
+
+The folder ``unfinished`` in the run's own has the signals and the reports of the master as they come, and in ``about.json``
+what they are of. It goes when the run is complete. Whoever writes there holds a lock, which ends with the process,
+however that ends.
+"""
+
+from __future__ import annotations
+
+import os
+import shutil
+import time
+from collections.abc import Iterator, Mapping
+from contextlib import contextmanager, suppress
+from pathlib import Path
+from typing import Any
+
+from orchestrator.coupling.errors import InputError, RunError
+from orchestrator.coupling.run.results import read_json, write_json
+from orchestrator.coupling.scratch import is_running
+
+FOLDER, ABOUT, LOCK = "unfinished", "about.json", "lock"
+
+
+@contextmanager
+def going_on(directory: Path, about: Mapping[str, Any]) -> Iterator[Path]:
+    """Give the folder that a run writes to while it goes on; it goes again where nothing came of the run.
+
+    Parameters
+    ----------
+    about : what is to be known of the run
+    """
+    folder = directory / FOLDER
+    folder.mkdir(parents=True)
+    try:
+        with _locked(folder / LOCK):
+            write_json(folder / ABOUT, {"process": os.getpid(), "started": time.time(), **about})
+            yield folder
+    except (InputError, RunError):
+        conclude(directory)
+        raise
+
+
+def conclude(directory: Path) -> None:
+    """Remove what a run has left while it was going on: it is complete now, or nothing came of it."""
+    shutil.rmtree(directory / FOLDER, ignore_errors=True)
+
+
+def goes_on(directory: Path) -> bool:
+    """Whether the run in `directory` is still going on, by its lock; where there are none, by the number of its process."""
+    folder = directory / FOLDER
+    try:
+        import fcntl
+    except ImportError:
+        return is_running(int(read_json(folder / ABOUT)["process"]))
+    with suppress(FileNotFoundError), open(folder / LOCK, "rb") as file:
+        try:
+            fcntl.flock(file, fcntl.LOCK_SH | fcntl.LOCK_NB)
+        except OSError:
+            return True
+    return False
+
+
+@contextmanager
+def _locked(path: Path) -> Iterator[None]:
+    with open(path, "wb") as file:
+        with suppress(ImportError, OSError):  # a system without such locks
+            import fcntl
+
+            fcntl.flock(file, fcntl.LOCK_EX | fcntl.LOCK_NB)
+        yield
