@@ -1,7 +1,8 @@
 """The command line. Progress and errors go to stderr, answers to stdout.
 
 Exit status: 0 done and within tolerance; 1 done, but a tolerance or a safety limit is missed; 2 wrong input;
-3 the run failed; 130 interrupted; 128 + the number of another signal that has ended it. What is heavy is imported where it is used, so that ``--help`` is quick.
+3 the run failed; 130 interrupted; 128 + the number of another signal that has ended it. What is heavy is imported where it
+is used, so that ``--help`` is quick.
 """
 
 from __future__ import annotations
@@ -16,11 +17,14 @@ import typer
 from typer.core import TyperGroup
 
 import orchestrator
-from orchestrator.cli import modes, new, options, printing
+from orchestrator.cli import modes, new, options, printing, streams
 from orchestrator.cli.identify import identify
 from orchestrator.cli.start import importing
 from orchestrator.cli.sweep import sweep
 from orchestrator.coupling.signals import Stopped, ending
+
+ANSWERS = ("list", "validate", "limits", "check")
+"""Commands that print, and leave nothing else: where their answer cannot be printed they have failed."""
 
 
 class Commands(TyperGroup):
@@ -31,7 +35,10 @@ class Commands(TyperGroup):
         warnings.simplefilter("once")  # a scenario may be read for every master and step
         warnings.showwarning = lambda message, *_: printing.complain(str(message))
         try:
-            return super().invoke(ctx)
+            done = super().invoke(ctx)
+            if streams.lost() is not None and ctx.invoked_subcommand in ANSWERS:
+                raise typer.Exit(3)  # which says why in the end
+            return done
         except (Exception, KeyboardInterrupt, Stopped) as error:
             status = _explained(error)
             if status is None:
@@ -326,6 +333,7 @@ def _items(text: str | None) -> list[str]:
 def main(arguments: list[str] | None = None) -> None:
     """Run the command line and end the process with its exit status."""
     printing.forgive_encodings()
+    streams.forgive()
     try:
         with ending():
             app(arguments)
@@ -338,6 +346,15 @@ def main(arguments: list[str] | None = None) -> None:
             sys.stderr.flush()
             os._exit(end.code if isinstance(end.code, int) else FAILED)
         raise
+    finally:
+        _say_what_is_lost()
+
+
+def _say_what_is_lost() -> None:
+    """Say on stderr that answers could not be printed."""
+    if (failure := streams.lost()) is not None:
+        printing.complain(f"standard output: {failure.strerror}; what was to be printed is lost, results are kept")
+    sys.stderr.flush()
 
 
 def _left_behind() -> bool:

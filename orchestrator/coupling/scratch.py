@@ -24,7 +24,8 @@ def scratch(folder: Path | None = None) -> Iterator[Path]:
     folder : in which it is made; None: the system's temporary one
     """
     remove_orphans(folder)
-    with tempfile.TemporaryDirectory(prefix=f"line-landing-{os.getpid()}-", dir=folder) as place:
+    prefix = f"line-landing-{os.getpid()}-"
+    with tempfile.TemporaryDirectory(prefix=prefix, dir=folder, ignore_cleanup_errors=True) as place:
         yield Path(place)
 
 

@@ -166,7 +166,7 @@ def judge(
     Parameters
     ----------
     table : signals at the communication points
-    tension : (n, m) N along the cable, if it is known beside that at supports and midspan
+    tension : (n, m) N along the cable, or (n,) the largest, if it is known beside that at supports and midspan
     errors : estimated error of signals, in their units
     fault : why the run ended before its time
     """
@@ -296,7 +296,7 @@ def _tension(table: Table, strength: float, along: np.ndarray | None) -> Series:
         raise NotRecorded(TENSIONS[0])
     largest = np.max(known, axis=0)
     if along is not None and len(along) == len(largest):
-        largest = np.maximum(largest, np.max(along, axis=1))
+        largest = np.maximum(largest, along if along.ndim == 1 else np.max(along, axis=1))
     return {None: largest / strength}
 
 

@@ -156,8 +156,10 @@ class Run:
 
     @property
     def exit_status(self) -> int:
-        """The exit status of ``orchestrator run``: 0 within and not unsafe, 1 missed or not safe, 3 failed; of one that a signal
-        has ended 128 + its number, 130 after Ctrl-C."""
+        """The exit status of ``orchestrator run``: 0 within and not unsafe, 1 missed or not safe, 3 failed.
+
+        Of one that a signal has ended it is 128 + the signal's number: 130 after Ctrl-C.
+        """
         if (number := self.summary.get("signal")) is not None:
             return SIGNALLED + number
         return MISSED if self.verdict == "within" and self.safe is False else EXIT_STATUS[self.verdict]

@@ -65,6 +65,12 @@ class Rows:
         if self._filled == len(self._open):
             self._next_piece()
 
+    def extend(self, rows: np.ndarray) -> None:
+        """Add rows (k, columns)."""
+        for row in rows:
+            self.next[:] = row
+            self.add()
+
     def flush(self) -> None:
         """Write the rows that were added; a failure is kept for `add`."""
         with self._lock:

@@ -9,26 +9,31 @@ import io
 import json
 import os
 import re
-from collections.abc import Iterator, Mapping
+from collections.abc import Iterable, Iterator, Mapping
 from contextlib import contextmanager
 from dataclasses import asdict, is_dataclass
+from itertools import islice
 from pathlib import Path
 from typing import Any
 
 import numpy as np
 
 from orchestrator.coupling.errors import InputError
-from orchestrator.coupling.run.columns import pieces_of
-from orchestrator.coupling.scratch import is_running
+from orchestrator.coupling.run.columns import Columns, Rows, pieces_of
+from orchestrator.coupling.scratch import is_running, scratch
 
 Table = Mapping[str, np.ndarray]
 """Columns of equal length by name; the first is ``time`` in s."""
+Fields = dict[str, np.ndarray]
+"""Arrays over time by name."""
 
 
 PART = re.compile(r"\.(.+)\.(\d+)(\.[^.]*)?")
 """Name of a file that a process, by its number, has not completed."""
 IN_MEMORY = 2**26
-"""Bytes of the fields of one file; it is made in memory. More are in several files, which the first one joins."""
+"""Bytes of a table that is read into memory."""
+LINES = 4096
+"""Rows of a longer one that are read at a time."""
 
 
 @contextmanager
@@ -108,14 +113,27 @@ def write_bytes(path: Path, content: bytes | memoryview) -> None:
 
 
 def read_table(path: Path) -> Table:
-    """Return the columns of a CSV table that `RunDirectory.write_table` or FMPy wrote."""
+    """Return the columns of a CSV table that `RunDirectory.write_table` or FMPy wrote; of a long one, columns on disk."""
     try:
         with open(path, encoding="utf-8", newline="") as file:
             names = next(csv.reader(file))
+            if os.fstat(file.fileno()).st_size > IN_MEMORY:
+                return _on_disk(names, file)
             values = np.loadtxt(file, delimiter=",", ndmin=2).reshape(-1, len(names))
     except (OSError, StopIteration, ValueError) as error:
         raise InputError(f"{path}: cannot be read as a table of results: {error}") from None
     return dict(zip(names, np.ascontiguousarray(values.T), strict=True))
+
+
+def _on_disk(names: list[str], lines: Iterable[str]) -> Columns:
+    """Return the columns of a table that is too long for memory: they are in a file that goes with them."""
+    lines = iter(lines)
+    with scratch() as folder:
+        rows = Rows(names, folder / "rows")
+        while piece := list(islice(lines, LINES)):
+            rows.extend(np.loadtxt(piece, delimiter=",", ndmin=2).reshape(-1, len(names)))
+        rows.flush()
+    return Columns(rows, {name: name for name in names})
 
 
 def read_json(path: Path) -> Any:

@@ -89,9 +89,9 @@ class Spool:
         try:
             self._file.seek(self._end)
             write_all(self._file, buffer.getbuffer())
-        except OSError:
+        except OSError as error:
             self._file.truncate(self._end)
-            raise
+            raise OSError(error.errno, error.strerror, str(self._file.name)) from None
         self._end += buffer.tell()
         return place
 
