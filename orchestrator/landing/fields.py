@@ -38,8 +38,12 @@ def cable_fields(
     if "cable.shape[1].position.x" not in table:
         return {}
     if isinstance(table, Columns):
-        largest = reduce(np.maximum, (table[f"cable.shape[{i}].tension"] for i in range(1, N_SHAPE + 1)))
-        return cable_fields(_thinned(table), length, nodes) | {"tension_max": largest}
+        few = _thinned(table)
+        fields = cable_fields(few, length, nodes)
+        if len(few["time"]) < len(table.rows):
+            tensions = (table[f"cable.shape[{i}].tension"] for i in range(1, N_SHAPE + 1))
+            fields["tension_max"] = reduce(np.maximum, tensions)
+        return fields
     shape = [f"cable.shape[{i}]" for i in range(1, N_SHAPE + 1)]
     return {
         "time": np.asarray(table["time"]),

@@ -16,13 +16,13 @@ from orchestrator.coupling.errors import InputError
 from orchestrator.coupling.run.results import Table, plain, read_fields, read_json, read_table
 from orchestrator.runs.compare import Comparison
 from orchestrator.runs.directory import RunDirectory, manifest
-from orchestrator.runs.going_on import FOLDER, goes_on
+from orchestrator.runs.going_on import FOLDER, goes_on, keep_signals
 from orchestrator.runs.result import Run
 from orchestrator.runs.unfinished import clean, load_unfinished, unfinished_in
 
 FIELD_UNITS = {
     "time": "s", "arc_length": "m", "position": "m", "tension": "N",
-    "node_arc_length": "m", "node_position": "m", "node_slope": "1",
+    "node_arc_length": "m", "node_position": "m", "node_slope": "1", "tension_max": "N",
 }  # fmt: skip
 COUNTS = {"iterations": int, "subdivisions": int, "rejected": int, "columns": int, "converged": bool}
 """Columns of ``iterations.csv`` that are no real numbers."""
@@ -85,6 +85,8 @@ def _write_tables(directory: RunDirectory, run: Run) -> None:
     directory.write_table("iterations.csv", run.iterations)
     if run.fields:
         directory.write_fields("fields.h5", run.fields, FIELD_UNITS)
+    if "tension_max" in run.fields:  # the shapes at some times; all are in this file
+        keep_signals(directory.path)
     if run.messages:
         directory.write_lines(FMU_LOG, run.messages)
     directory.write_json("summary.json", run.summary)

@@ -17,6 +17,7 @@ from typing import Any
 
 from orchestrator.coupling.errors import InputError, RunError
 from orchestrator.coupling.run.results import read_json, write_json
+from orchestrator.coupling.run.simulate import SIGNALS
 from orchestrator.coupling.scratch import is_running
 
 FOLDER, ABOUT, LOCK = "unfinished", "about.json", "lock"
@@ -44,6 +45,16 @@ def going_on(directory: Path, about: Mapping[str, Any]) -> Iterator[Path]:
 def conclude(directory: Path) -> None:
     """Remove what a run has left while it was going on: it is complete now, or nothing came of it."""
     shutil.rmtree(directory / FOLDER, ignore_errors=True)
+
+
+def keep_signals(directory: Path) -> None:
+    """Let the file of all signals outlast the run, beside its tables: a second name for it, so that it is never away."""
+    source, target = directory / FOLDER / SIGNALS, directory / SIGNALS
+    if source.is_file() and not target.exists():
+        try:
+            os.link(source, target)
+        except OSError:  # a file system without second names
+            shutil.copyfile(source, target)
 
 
 def goes_on(directory: Path) -> bool:

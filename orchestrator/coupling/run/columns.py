@@ -10,7 +10,7 @@ import numpy as np
 
 from orchestrator.coupling.run.spool import Spool
 
-HELD = 2**25
+HELD = 2**26
 """Bytes of rows that are held in memory; with a file, more are read from there."""
 PIECE = 2**19
 """Bytes of the rows that are written at a time, about."""
@@ -138,10 +138,11 @@ class Rows:
             yield from self._held or ()
             yield self._open[: self._filled]
 
-    def close(self) -> None:
-        """Close the file; what is not held can no longer be read."""
-        if self._spool is not None:
+    def release(self) -> None:
+        """Close the file if all is in memory: it is not needed any more."""
+        if self._held is not None and self._spool is not None:
             self._spool.close()
+            self._spool = None
 
 
 class Columns(Mapping[str, np.ndarray]):

@@ -87,6 +87,8 @@ def simulate(
         else:
             _watched(simulation, start, stop, timeout)
         simulation.finish()
+    for rows in (log.rows, log.reports):
+        rows.release()
     return log
 
 
