@@ -23,6 +23,7 @@ from fmus.kernels.jit import COMPILATION
 from orchestrator.catalogue.documents import read_once
 from orchestrator.coupling.errors import InputError, RunError, nearest
 from orchestrator.coupling.masters import MASTERS
+from orchestrator.coupling.scratch import remove_left_overs
 from orchestrator.coupling.signals import deferred, passed_on
 from orchestrator.runs.compare import Comparison, compared
 from orchestrator.runs.coupled import Interrupted, run_coupled
@@ -269,6 +270,7 @@ class Changes:
 
 def _ready(scenario: Scenario) -> System:
     """Return the scenario resolved; a landing's kernels are compiled before, which takes half the time side by side."""
+    remove_left_overs()
     if isinstance(scenario, LandingScenario):
         compile_modules()
     return resolve(scenario)

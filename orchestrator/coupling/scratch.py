@@ -9,10 +9,13 @@ from collections.abc import Iterator
 from contextlib import contextmanager, suppress
 from pathlib import Path
 
-from orchestrator.coupling.cache import remove
+from orchestrator.coupling.cache import remove, user_folder
 
 NAME = re.compile(r"line-landing-(\d+)-\w+")
 """Of a folder in the system's temporary one; the number is that of its process."""
+
+PART = re.compile(r"\.(.+)\.(\d+)(\.[^.]*)?")
+"""Name of a file that a process, by its number, has not completed."""
 
 
 @contextmanager
@@ -36,6 +39,21 @@ def remove_orphans(folder: Path | None = None) -> None:
             found = NAME.fullmatch(entry.name)
             if found is not None and not is_running(int(found[1])) and _is_ours(entry):
                 remove(entry)
+
+
+def remove_left_overs() -> None:
+    """Remove what killed processes have left in the temporary folder and in that of unzipped FMUs."""
+    remove_orphans()
+    with suppress(OSError):
+        remove_orphans(user_folder("unzipped", plain=True))
+
+
+def remove_parts(folder: Path) -> None:
+    """Remove the files in `folder` that were not completed and whose process is no more."""
+    for path in folder.glob(".*"):
+        part = PART.fullmatch(path.name)
+        if part is not None and path.is_file() and not is_running(int(part[2])):
+            path.unlink(missing_ok=True)
 
 
 def is_running(process: int) -> bool:

@@ -109,6 +109,7 @@ class Safety:
     not_judged : limit → why not
     faults : why it is not safe whatever the limits say: the robot fell off, the run did not come to its end
     touched, airborne : whether a wheel has touched the line; whether none does at the end
+    apart : s between the points that were judged, where these are not all communication points; else 0
     """
 
     until: float
@@ -117,6 +118,7 @@ class Safety:
     faults: Sequence[str] = ()
     touched: bool = True
     airborne: bool = False
+    apart: float = 0.0
 
     @property
     def safe(self) -> bool | None:
@@ -132,7 +134,7 @@ class Safety:
     @property
     def words(self) -> str:
         """The verdict in a line: what it covers, and up to when."""
-        until = f"until {digits(self.until)} s"
+        until = f"until {digits(self.until)} s" + (f", at points {digits(self.apart)} s apart" if self.apart else "")
         if self.safe:
             end = "; in the air at the end" if self.airborne else ""
             return f"SAFE {until}: {', '.join(self.limits)} kept{end}"

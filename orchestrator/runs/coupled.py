@@ -129,7 +129,7 @@ def run_coupled(
     with opened(system) as graph:
         fmus = {n: {"file": str(f.path), "sha256": f.sha256} for n, f in graph.components.items()}
         exchange = coarsest(fmu.exchange for fmu in graph.components.values())
-        notes = system.notes(graph)
+        notes = [*system.notes(graph), *_left_out(system.scenario)]
         about = _about(system.scenario, graph) | {"fmus": fmus, "exchange": exchange, "notes": notes}
         with nullcontext() if directory is None else going_on(directory, about) as folder:
             log = _simulated(system.scenario, graph, progress, folder)
@@ -139,6 +139,15 @@ def run_coupled(
     fields, table = system.split(log.table)
     notes = [*notes, *([log.ended] if log.ended else [])]
     return Coupled(system, exchange, log, table, fields, fmus, notes=notes, messages=messages, folder=folder)
+
+
+def _left_out(scenario: Scenario) -> list[str]:
+    """Return what has to be known of results that do not have every communication point."""
+    interval = scenario.simulation.output_interval
+    if scenario.simulation.every == 1 or interval is None:
+        return []
+    what = "extremes, limits, energy and errors are those of these points, peak forces those of all macro steps"
+    return [f"recorded is a point every {digits(interval)} s (output_interval): {what}; iterations.csv has all of them"]
 
 
 def _at_the_start(error: FmuError) -> RunError:

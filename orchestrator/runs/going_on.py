@@ -37,8 +37,9 @@ def going_on(directory: Path, about: Mapping[str, Any]) -> Iterator[Path]:
         with _locked(folder / LOCK):
             write_json(folder / ABOUT, {"process": os.getpid(), "started": time.time(), **about})
             yield folder
-    except (InputError, RunError):
-        conclude(directory)
+    except (InputError, RunError, OSError) as error:
+        if not (isinstance(error, OSError) and (folder / ABOUT).is_file()):  # else the disk is full, and rows are kept
+            conclude(directory)
         raise
 
 

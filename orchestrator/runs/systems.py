@@ -212,7 +212,9 @@ class LandingSystem:
         fault: str | None = None,
     ) -> Safety:
         """Return the signals held against the limits; parameters as for `judge`."""
-        return judge(self.limits, table, tension_of(fields), errors, fault)
+        simulation = self.scenario.simulation
+        apart = (simulation.output_interval or 0.0) if simulation.every > 1 else 0.0
+        return replace(judge(self.limits, table, tension_of(fields), errors, fault), apart=apart)
 
     def changed(self, options: Mapping[str, Any], **simulation: Any) -> LandingSystem:
         """Return it with other options of the master and other simulation settings; the start stays as it is."""

@@ -11,8 +11,9 @@ from orchestrator.coupling.errors import InputError
 from orchestrator.coupling.fmu.failure import FmuError
 from orchestrator.coupling.run.columns import Rows
 from orchestrator.coupling.run.log import Log
-from orchestrator.coupling.run.results import read_json, remove_parts
+from orchestrator.coupling.run.results import read_json
 from orchestrator.coupling.run.simulate import SIGNALS, STEPS
+from orchestrator.coupling.scratch import remove_parts
 from orchestrator.runs.coupled import Coupled
 from orchestrator.runs.going_on import ABOUT, FOLDER, goes_on
 from orchestrator.runs.result import Run

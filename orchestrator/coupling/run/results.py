@@ -8,7 +8,6 @@ import errno
 import io
 import json
 import os
-import re
 from collections.abc import Iterable, Iterator, Mapping
 from contextlib import contextmanager
 from dataclasses import asdict, is_dataclass
@@ -20,7 +19,7 @@ import numpy as np
 
 from orchestrator.coupling.errors import InputError
 from orchestrator.coupling.run.columns import Columns, Rows, pieces_of
-from orchestrator.coupling.scratch import is_running, scratch
+from orchestrator.coupling.scratch import scratch
 
 Table = Mapping[str, np.ndarray]
 """Columns of equal length by name; the first is ``time`` in s."""
@@ -28,8 +27,6 @@ Fields = dict[str, np.ndarray]
 """Arrays over time by name."""
 
 
-PART = re.compile(r"\.(.+)\.(\d+)(\.[^.]*)?")
-"""Name of a file that a process, by its number, has not completed."""
 IN_MEMORY = 2**26
 """Bytes of a table that is read into memory."""
 LINES = 4096
@@ -65,14 +62,6 @@ def _synced(path: Path) -> None:
             raise
     finally:
         os.close(handle)
-
-
-def remove_parts(folder: Path) -> None:
-    """Remove the files in `folder` that were not completed and whose process is no more."""
-    for path in folder.glob(".*"):
-        part = PART.fullmatch(path.name)
-        if part is not None and path.is_file() and not is_running(int(part[2])):
-            path.unlink(missing_ok=True)
 
 
 def write_table(path: Path, table: Table) -> None:
