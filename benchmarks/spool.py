@@ -2,8 +2,9 @@
 
     python -m benchmarks.spool [ROUNDS]
 
-The flagship (2 s at 5 ms, 600 signals a row) and the oscillator (10 s at 1 ms, 7 signals). Printed: CPU time a macro step in µs, and
-the median over the rounds of the ratio within a round, for the loop alone: with and without, tables are written once, at the end.
+The flagship (2 s at 5 ms, 600 signals a row) and the oscillator (10 s at 1 ms, 7 signals). Printed: CPU time of the loop in
+µs a macro step, and the median over the rounds of the ratio within a round. With and without, tables are written once,
+at the end; that is not counted.
 """
 
 from __future__ import annotations
@@ -47,7 +48,9 @@ def main(rounds: int = 7) -> None:
         times = turns(contestants, rounds)
         each = {kind: 1e6 * float(np.median(values)) * step / stop for kind, values in times.items()}
         by = ratio(times, "with", "without")
-        print(f"{name}: {each['without']:.0f} µs a step in memory, {each['with']:.0f} µs to disk; {100 * (by - 1):+.1f} %")
+        print(
+            f"{name}: {each['without']:.0f} µs a step in memory, {each['with']:.0f} µs to disk; {100 * (by - 1):+.1f} %"
+        )
 
 
 if __name__ == "__main__":

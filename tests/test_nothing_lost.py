@@ -24,13 +24,14 @@ import pytest
 import orchestrator
 from orchestrator.catalogue.library import build_all
 from orchestrator.cli import commands
-from orchestrator.coupling.run.results import read_fields, read_table, write_fields
+from orchestrator.coupling.run.results import plain, read_fields, read_table, write_fields
 from orchestrator.coupling.scratch import remove_left_overs, remove_parts, scratch
 from orchestrator.report.page import report
 from orchestrator.runs import unfinished
+from orchestrator.runs.coupled import noted_of
 from orchestrator.runs.going_on import FOLDER
-from orchestrator.runs.unfinished import load_unfinished, unfinished_in
-from tests.scenarios import OSCILLATOR
+from orchestrator.runs.unfinished import load_unfinished, scenario_of, unfinished_in
+from tests.scenarios import OSCILLATOR, SCENARIOS
 
 pytestmark = pytest.mark.skipif(os.name == "nt", reason="processes are forked, and killed by signals")
 LONG = {"stop": 1e4, "estimate": "none", "pictures": False}
@@ -191,6 +192,14 @@ def test_it_is_the_run_that_it_would_have_been(tmp_path: Path, monkeypatch):
         assert list(one) == list(other) and all(np.array_equal(one[n], other[n], equal_nan=True) for n in one)
     differ = {key for key, value in whole.summary.items() if left.summary[key] != value}
     assert {"verdict"} <= differ <= {"verdict", "wall_s", "wall_per_simulated_s", "wall_components_s", "solves"}
+
+
+@pytest.mark.parametrize("path", sorted(SCENARIOS.glob("*.toml")), ids=lambda path: path.stem)
+def test_a_scenario_reads_back_from_what_a_run_has_noted(path: Path):
+    loaded = orchestrator.load_scenario(path)
+    noted = json.loads(json.dumps(plain(noted_of(loaded))))
+    read = scenario_of(noted)
+    assert read == loaded and (read.path, read.provenance, read.notes) == (loaded.path, loaded.provenance, loaded.notes)
 
 
 def compares(out: Path, watch: Watch) -> None:

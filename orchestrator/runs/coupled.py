@@ -156,14 +156,20 @@ def _at_the_start(error: FmuError) -> RunError:
     return RunError(str(error), 0.0)
 
 
-def _about(scenario: Scenario, graph: Graph) -> dict[str, Any]:
-    """Return what has to be known of a run that died, beside its rows."""
-    recorder = Recorder(graph, recorded(graph, scenario))
+def noted_of(scenario: Scenario) -> dict[str, Any]:
+    """Return what has to be known of a scenario to have it again."""
     return {
         "scenario": str(scenario.path),
         "resolved": scenario.model_dump(exclude_none=True),
         "provenance": scenario.provenance,
         "scenario_notes": scenario.notes,
+    }
+
+
+def _about(scenario: Scenario, graph: Graph) -> dict[str, Any]:
+    """Return what has to be known of a run that died, beside its rows."""
+    recorder = Recorder(graph, recorded(graph, scenario))
+    return noted_of(scenario) | {
         "master": scenario.simulation.master,
         "macro_step": scenario.simulation.macro_step,
         "every": scenario.simulation.every,

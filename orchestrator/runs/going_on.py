@@ -40,6 +40,8 @@ def going_on(directory: Path, about: Mapping[str, Any]) -> Iterator[Path]:
     except (InputError, RunError, OSError) as error:
         if not (isinstance(error, OSError) and (folder / ABOUT).is_file()):  # else the disk is full, and rows are kept
             conclude(directory)
+            with suppress(OSError):
+                directory.rmdir()
         raise
 
 

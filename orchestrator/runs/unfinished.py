@@ -85,12 +85,12 @@ def _read(directory: Path) -> Coupled:
     log.error = Unfinished(float(log.time[-1]), GOES_ON if goes_on(directory) else DIED)
     log.wall = max((folder / SIGNALS).stat().st_mtime - about["started"], 0.0)
     log.wall_components = dict.fromkeys(about["fmus"], float("nan"))
-    system = resolve(_scenario(about))
+    system = resolve(scenario_of(about))
     fields, table = system.split(log.table)
     return Coupled(system, about["exchange"], log, table, fields, about["fmus"], notes=about["notes"])
 
 
-def _scenario(about: Mapping[str, Any]) -> Scenario:
+def scenario_of(about: Mapping[str, Any]) -> Scenario:
     """Return the scenario as it was resolved when the run began."""
     resolved = about["resolved"]
     kind = GraphScenario if "components" in resolved else LandingScenario
