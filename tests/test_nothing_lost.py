@@ -437,8 +437,8 @@ def test_streams_that_take_nothing_cost_no_results(tmp_path: Path, what: str):
         full = os.open("/dev/full", os.O_WRONLY) if what == "full" else None
         os.close(reading[0])
         for number, name in ((1, "stdout"), (2, "stderr")):
-            setattr(sys, name, None if what == "closed" else stream(number))
             os.close(number) if what == "closed" else os.dup2(full or reading[1], number)
+            setattr(sys, name, None if what == "closed" else stream(number))
         commands.main(["run", str(OSCILLATOR), "--out", str(out), "--stop", "0.5", "--no-pictures"])
 
     if what == "full" and not Path("/dev/full").exists():

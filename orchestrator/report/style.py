@@ -73,7 +73,7 @@ def saved(path: Path, size: tuple[float, float], dpi: float | None = None) -> It
         yield figure
         if text := _note.get():
             figure.text(0.995, 0.005, text, ha="right", va="bottom", fontsize=5, color=GREY)
-        with suppress(OverflowError), replacing(path) as temporary:
+        with suppress(OverflowError), replacing(path, lasting=False) as temporary:
             figure.savefig(temporary, dpi=dpi or STYLE["savefig.dpi"])
 
 
@@ -143,6 +143,6 @@ def save_figure(figure: Figure, place: Path) -> list[Path]:
     """Write a figure as PNG, and as PDF for a paper; return the paths: `place` with their endings."""
     paths = [place.with_suffix(f".{kind}") for kind in ("png", "pdf")]
     for path in paths:
-        with replacing(path) as temporary, matplotlib.rc_context(STYLE):
+        with replacing(path, lasting=False) as temporary, matplotlib.rc_context(STYLE):
             figure.savefig(temporary, dpi=STYLE["savefig.dpi"])
     return paths

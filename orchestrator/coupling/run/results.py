@@ -34,18 +34,24 @@ LINES = 4096
 
 
 @contextmanager
-def replacing(path: Path) -> Iterator[Path]:
+def replacing(path: Path, *, lasting: bool = True) -> Iterator[Path]:
     """Give a name to write to; move it to `path` at the end, or remove it if the writing failed.
 
     What is moved is on the disk, and so is its new name: after a power cut there is the old file or the new one, whole.
+
+    Parameters
+    ----------
+    lasting : False of what can be made again, as pictures are: it may be lost in a power cut
     """
     path.parent.mkdir(parents=True, exist_ok=True)
     temporary = path.with_name(f".{path.stem}.{os.getpid()}{path.suffix}")
     try:
         yield temporary
-        _synced(temporary)
+        if lasting:
+            _synced(temporary)
         os.replace(temporary, path)
-        _synced(path.parent)
+        if lasting:
+            _synced(path.parent)
     finally:
         temporary.unlink(missing_ok=True)
 

@@ -4,6 +4,7 @@ from __future__ import annotations
 
 from collections.abc import Iterator, Sequence
 from dataclasses import fields
+from operator import attrgetter
 from typing import Any, overload
 
 import numpy as np
@@ -16,6 +17,9 @@ KINDS: dict[str, type] = {"iterations": int, "subdivisions": int, "rejected": in
 """What is no real number."""
 POWER = "power_residual."
 """Begins the name of the column of one load: W, its power residual in each macro step."""
+
+
+_all = attrgetter(*NAMES)
 
 
 class Steps(Sequence[StepReport]):
@@ -53,7 +57,7 @@ class Steps(Sequence[StepReport]):
 def add(rows: Rows, report: StepReport, powers: Any) -> None:
     """Write a report and the power residuals of all loads (W) as the next row."""
     row = rows.next
-    row[: len(NAMES)] = [getattr(report, name) for name in NAMES]
+    row[: len(NAMES)] = _all(report)
     row[len(NAMES) :] = powers
     rows.add()
 
