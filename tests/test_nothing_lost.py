@@ -182,6 +182,18 @@ def test_what_a_killed_run_has_left_becomes_files(tmp_path: Path):
     assert f"up to {last:g} s" in (out / "report.html").read_text()
 
 
+def test_a_run_goes_on_until_its_files_are_written(tmp_path: Path, monkeypatch):
+    """While its error is estimated, too: it is not for others to say that it has died."""
+    out, seen = tmp_path / "out", []
+
+    def look(task: str, t: float, stop: float) -> None:
+        if "estimate" in task and not seen:
+            seen.append(load_unfinished(out).error)
+
+    orchestrator.run(OSCILLATOR, stop=0.2, out=out, progress=look, pictures=False)
+    assert seen == [f"unfinished, up to t = 0.2 s: {unfinished.GOES_ON}"] and manifest(out)["complete"]
+
+
 def test_it_is_the_run_that_it_would_have_been(tmp_path: Path, monkeypatch):
     """Signals, reports, extremes and all that is made of them: bit for bit."""
     settings = {"stop": 1.0, "estimate": "none", "out": tmp_path / "out", "pictures": False}

@@ -208,6 +208,8 @@ def completed(system: System, progress: Reached, directory: Path | None = None) 
     except InputError as error:  # an FMU that cannot be stepped so finely
         step = system.scenario.simulation.macro_step
         raise RunError(f"no run with a macro step of {digits(step)} s: {error}") from None
+    except Interrupted:
+        raise
     except RunError as error:
         raise _plain(error) from None
     if isinstance(coupled.log.error, Interruption):

@@ -17,7 +17,7 @@ import numpy as np
 
 from orchestrator.coupling.errors import InputError
 from orchestrator.coupling.run.results import write_bytes, write_fields, write_json, write_table
-from orchestrator.runs.going_on import conclude
+from orchestrator.runs.going_on import conclude, let_go
 
 PACKAGES = ("line-landing", "numpy", "scipy", "numba", "fmpy", "pythonfmu")
 
@@ -110,6 +110,7 @@ def claimed(out: Path | str | None, name: str) -> Iterator[RunDirectory]:
     try:
         yield directory
     finally:
+        let_go(directory.path)
         directory.discard()
 
 

@@ -13,7 +13,7 @@ import time
 from collections.abc import Iterator, Mapping
 from contextlib import contextmanager, suppress
 from pathlib import Path
-from typing import Any
+from typing import Any, BinaryIO
 
 from orchestrator.coupling.errors import InputError, RunError
 from orchestrator.coupling.run.results import read_json, write_json
@@ -21,6 +21,7 @@ from orchestrator.coupling.run.simulate import SIGNALS
 from orchestrator.coupling.scratch import is_running
 
 FOLDER, ABOUT, LOCK = "unfinished", "about.json", "lock"
+_locks: dict[Path, BinaryIO] = {}
 
 
 @contextmanager
@@ -34,9 +35,9 @@ def going_on(directory: Path, about: Mapping[str, Any]) -> Iterator[Path]:
     folder = directory / FOLDER
     folder.mkdir(parents=True)
     try:
-        with _locked(folder / LOCK):
-            write_json(folder / ABOUT, {"process": os.getpid(), "started": time.time(), **about})
-            yield folder
+        _lock(folder / LOCK)
+        write_json(folder / ABOUT, {"process": os.getpid(), "started": time.time(), **about})
+        yield folder
     except (InputError, RunError, OSError) as error:
         if not (isinstance(error, OSError) and (folder / ABOUT).is_file()):  # else the disk is full, and rows are kept
             conclude(directory)
@@ -47,6 +48,7 @@ def going_on(directory: Path, about: Mapping[str, Any]) -> Iterator[Path]:
 
 def conclude(directory: Path) -> None:
     """Remove what a run has left while it was going on: it is complete now, or nothing came of it."""
+    let_go(directory)
     shutil.rmtree(directory / FOLDER, ignore_errors=True)
 
 
@@ -75,11 +77,16 @@ def goes_on(directory: Path) -> bool:
     return False
 
 
-@contextmanager
-def _locked(path: Path) -> Iterator[None]:
-    with open(path, "wb") as file:
-        with suppress(ImportError, OSError):  # a system without such locks
-            import fcntl
+def let_go(directory: Path) -> None:
+    """Give up the locks of the runs in `directory`: they do not go on any more."""
+    for path in [path for path in _locks if directory in path.parents]:
+        _locks.pop(path).close()
 
-            fcntl.flock(file, fcntl.LOCK_EX | fcntl.LOCK_NB)
-        yield
+
+def _lock(path: Path) -> None:
+    """Lock a new file as long as the run goes on, its error is estimated, and its files are written."""
+    file = _locks[path] = open(path, "wb")  # noqa: SIM115 (closed by `let_go`, or by the end of the process)
+    with suppress(ImportError, OSError):  # a system without such locks
+        import fcntl
+
+        fcntl.flock(file, fcntl.LOCK_EX | fcntl.LOCK_NB)
