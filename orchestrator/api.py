@@ -38,10 +38,11 @@ from orchestrator.runs.files import (
     write_run,
     write_unfinished,
 )
+from orchestrator.runs.recovered import write_recovered
 from orchestrator.runs.result import Run, Signal, run_label
 from orchestrator.runs.summary import result
 from orchestrator.runs.systems import System, resolve
-from orchestrator.runs.unfinished import load_unfinished
+from orchestrator.runs.unfinished import is_unfinished, load_unfinished
 from orchestrator.runs.whatif import leave
 from orchestrator.scenario.layers import shared_options
 from orchestrator.scenario.read import load
@@ -211,6 +212,23 @@ def sweep(
     from orchestrator.studies.sweep.result import run as run_all  # with what only studies need
 
     return run_all(study, out, workers, timeout, progress or (lambda done, of, failed: None), dask)
+
+
+def report_of(directory: Path) -> Path:
+    """Draw the pictures of a run or comparison anew, and return its page; of a sweep, the page alone.
+
+    Of a run that has left no manifest all there is becomes files like those of one that has failed, with page and pictures;
+    if it still goes on, in a folder of their own.
+
+    Raises
+    ------
+    InputError : there are no results, or they are damaged
+    """
+    from orchestrator.report import page
+
+    if is_unfinished(directory):
+        return write_recovered(RunDirectory.of(directory), _views(True)) / page.NAME
+    return page.report(directory)
 
 
 def load_scenario(

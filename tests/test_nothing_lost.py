@@ -22,11 +22,11 @@ import numpy as np
 import pytest
 
 import orchestrator
+from orchestrator.api import report_of
 from orchestrator.catalogue.library import build_all
 from orchestrator.cli import commands
 from orchestrator.coupling.run.results import plain, read_fields, read_table, write_fields
 from orchestrator.coupling.scratch import remove_left_overs, remove_parts, scratch
-from orchestrator.report.page import report
 from orchestrator.runs import unfinished
 from orchestrator.runs.coupled import noted_of
 from orchestrator.runs.going_on import FOLDER
@@ -166,14 +166,14 @@ def test_what_a_killed_run_has_left_becomes_files(tmp_path: Path):
     until(going(out))
     with pytest.raises(orchestrator.InputError, match=r"no manifest\.json.*load_unfinished"):
         orchestrator.load_run(out)
-    page = report(out)
+    page = report_of(out)
     assert page == out / FOLDER / "so_far" / "report.html" and not (out / "manifest.json").exists()
     assert "still going on" in manifest(page.parent)["error"]
     os.kill(process, signal.SIGKILL)
     assert ended(process) == 137
     (out / ".results.999999999.csv").write_text("half")
     last = load_unfinished(out).time[-1]
-    assert report(out) == out / "report.html"
+    assert report_of(out) == out / "report.html"
     run = orchestrator.load_run(out)
     assert manifest(out)["complete"] is False and run.verdict == "failed" and run.time[-1] == last
     assert run.error == f"unfinished, up to t = {last:g} s: {unfinished.DIED}" and run.exit_status == 3
@@ -225,7 +225,7 @@ def check_comparison(out: Path, watch: Watch, killed: float) -> None:
     if (out / "manifest.json").is_file():
         assert manifest(out)["complete"] and len(orchestrator.load_comparison(out).results) == 2
     elif unfinished_in(out) and all(map(rows_on_disk, unfinished_in(out))):
-        report(out)
+        report_of(out)
         assert manifest(out)["complete"] is False and not unfinished_in(out)
 
 

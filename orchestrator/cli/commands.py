@@ -306,10 +306,10 @@ def report(
 ) -> None:
     """Draw pictures and a page of results: of a finished run, or of what an unfinished one has left so far."""
     with importing():
+        from orchestrator.api import report_of
         from orchestrator.coupling.run.results import read_json
-        from orchestrator.report.page import report as make
 
-    page = make(directory)
+    page = report_of(directory)
     manifest = page.parent / "manifest.json"
     if manifest.is_file() and (error := read_json(manifest)["error"]) is not None:
         printing.complain(f"{page.parent}: {error}")

@@ -16,9 +16,8 @@ from orchestrator.coupling.errors import InputError
 from orchestrator.coupling.run.results import Table, plain, read_fields, read_json, read_table
 from orchestrator.runs.compare import Comparison
 from orchestrator.runs.directory import RunDirectory, manifest
-from orchestrator.runs.going_on import FOLDER, goes_on, keep_signals
+from orchestrator.runs.going_on import FOLDER, keep_signals
 from orchestrator.runs.result import Run
-from orchestrator.runs.unfinished import clean, load_unfinished, unfinished_in
 
 FIELD_UNITS = {
     "time": "s", "arc_length": "m", "position": "m", "tension": "N",
@@ -117,36 +116,9 @@ def _dependencies(run: Run) -> dict[str, Any]:
     return {name: value for name, value in run.manifest.items() if name not in ("complete", "error")}
 
 
-def write_recovered(directory: RunDirectory, views: Views = NO_VIEWS) -> Path:
-    """Write what the unfinished runs in a directory have left as files like those of a run that has failed.
-
-    A run that still goes on is left alone: what is made of it goes into a folder of its own.
-
-    Returns
-    -------
-    Path
-        the folder that was written: `directory`, or that of what there is so far
-    """
-    clean(directory.path)
-    runs = [(folder, load_unfinished(folder)) for folder in unfinished_in(directory.path)]
-    places = [
-        _recovered(RunDirectory.within(RunDirectory.of(folder), _so_far(folder)), run, views) for folder, run in runs
-    ]
-    if places == [directory.path] or any(goes_on(folder) for folder, _ in runs):
-        return places[-1]
-    first = read_run(min(path.parent for path in directory.path.glob("*/manifest.json")))
-    error = "; ".join(str(run.error) for _, run in runs) or "unfinished: the comparison has not come to its end"
+def write_end(directory: RunDirectory, first: Run, error: str, views: Views = NO_VIEWS) -> None:
+    """Write what stands beside the runs of a comparison that has died: page and manifest, with `error`."""
     directory.write_manifest(_dependencies(first) | _viewed(directory, first, error, views), error)
-    return directory.path
-
-
-def _so_far(folder: Path) -> str:
-    return f"{FOLDER}/so_far" if goes_on(folder) else "."
-
-
-def _recovered(place: RunDirectory, run: Run, views: Views) -> Path:
-    write_run(place, run, views)
-    return place.path
 
 
 # -- reading --------------------------------------------------------------------------------------------------

@@ -13,9 +13,7 @@ from orchestrator.report.page import template
 from orchestrator.report.page.content import Content, of_results
 from orchestrator.report.page.sweep import is_sweep, of_sweep
 from orchestrator.report.page.template import DIST, is_built
-from orchestrator.runs.directory import RunDirectory
-from orchestrator.runs.files import Views, require_finished, write_recovered
-from orchestrator.runs.unfinished import is_unfinished
+from orchestrator.runs.files import require_finished
 
 NAME = "report.html"
 MOST = 4_000_000
@@ -27,9 +25,6 @@ OWN = 1_250_000
 def report(directory: Path, web: Path = DIST) -> Path:
     """Draw the pictures of a finished run or comparison anew, and return the page; of a sweep, the page alone.
 
-    Of a run that has left no manifest all there is becomes files like those of one that has failed, with page and pictures;
-    if it still goes on, in a folder of their own.
-
     Parameters
     ----------
     web : folder of the template that was built; where it is missing the page has the pictures in it
@@ -40,11 +35,6 @@ def report(directory: Path, web: Path = DIST) -> Path:
     """
     if is_sweep(directory):
         return _guarded(directory, lambda: write_sweep(directory, web))
-    if is_unfinished(directory):
-        views = Views(
-            lambda place: list(pictures(place, results_in(place))), lambda place, said: write(place, said, web)
-        )
-        return _guarded(directory, lambda: write_recovered(RunDirectory.of(directory), views) / NAME)
     require_finished(directory)
     return _guarded(directory, lambda: _drawn_anew(directory, web))
 
