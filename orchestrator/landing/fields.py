@@ -10,8 +10,9 @@ import numpy as np
 from fmus.cable.mesh import spread
 from fmus.cable.module import N_NODES, N_SHAPE
 from orchestrator.coupling.run.columns import Columns
-from orchestrator.coupling.run.results import IN_MEMORY
 
+IN_MEMORY = 2**25
+"""Bytes of fields that are made of a table that is on disk."""
 SHAPES = ("cable.shape[", "cable.node[")
 """Begin the names of signals that are fields, and no columns of a table."""
 
