@@ -11,7 +11,7 @@ from fmus.cable.mesh import spread
 from fmus.cable.module import N_NODES, N_SHAPE
 from orchestrator.coupling.run.columns import Columns
 
-IN_MEMORY = 2**25
+IN_MEMORY = 2**24
 """Bytes of fields that are made of a table that is on disk."""
 SHAPES = ("cable.shape[", "cable.node[")
 """Begin the names of signals that are fields, and no columns of a table."""

@@ -10,8 +10,8 @@ from orchestrator.coupling.run.columns import some_of
 from orchestrator.coupling.run.results import Table
 from orchestrator.runs.result import Run
 
-MOST = 50_000
-"""Points that a curve of a picture may have: 30 for each of its pixels."""
+MOST = 20_001
+"""Points that a curve of a picture may have, some ten for each of its pixels: 20 s at 1 ms."""
 OF_STEPS = ("time", "iterations", "converged")
 """What a picture shows of each macro step."""
 
