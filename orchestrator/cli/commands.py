@@ -18,6 +18,7 @@ from typer.core import TyperGroup
 
 import orchestrator
 from orchestrator.cli import modes, new, options, printing, streams
+from orchestrator.cli.export import export
 from orchestrator.cli.identify import identify
 from orchestrator.cli.start import importing
 from orchestrator.cli.sweep import sweep
@@ -134,6 +135,9 @@ def validate(scenario: options.Scenario, robot: options.Robot = None, set_: opti
     with opened(system) as graph:
         master_of(loaded, graph)
         print(f"{scenario}: valid; {len(graph.components)} FMUs, {len(list(graph.connections))} connections")
+        apart = [name for name, fmu in graph.components.items() if fmu.limits]
+        if apart:
+            print(f"in processes of their own: {', '.join(apart)}")
         for note in system.notes(graph):
             print(note)
     if isinstance(system, LandingSystem) and system.landing.rest is not None:
@@ -296,6 +300,7 @@ def reproduce(
     raise typer.Exit(done.exit_status)
 
 
+app.command()(export)
 app.command()(identify)
 app.command()(sweep)
 

@@ -46,6 +46,7 @@ from orchestrator.landing.resolve import MESH_KEYS, MESH_TOLERANCE, Landing, Var
 from orchestrator.landing.resolve import resolve as resolve_landing
 from orchestrator.landing.safety import Limits, Safety, judge
 from orchestrator.landing.wiring import inner_step, lacking, landing_graph
+from orchestrator.scenario.isolation import isolation
 from orchestrator.scenario.over_time import courses, held
 from orchestrator.scenario.types import CableSection, Component, GraphScenario, LandingScenario, RobotSection, Scenario
 
@@ -162,6 +163,8 @@ class LandingSystem:
         """Return another exchange than that asked for, and what nothing feeds; our cable and robot need no more than is fed."""
         contacts = [name for name in graph.components if name.startswith("contact")]
         foreign = {"cable": self.landing.cable.foreign, "robot": self.landing.robot.foreign}
+        if self.landing.controller is not None:
+            foreign["controller"] = self.landing.controller.foreign
         named = [*contacts, *(name for name, file in foreign.items() if file is not None)]
         names = [n for n in graph.unfed if owner_of(n) in named and not is_unused(variable_of(n), len(contacts))]
         lacks = zip(contacts, lacking(graph.components), strict=True)
@@ -259,7 +262,8 @@ class GraphSystem:
         try:
             for name, section in self.scenario.components.items():
                 file = section.fmu or library.module_fmu(str(section.model))
-                components[name] = instance(file, name, section.steps, section.continuous)
+                apart = isolation(section, self.scenario.simulation)
+                components[name] = instance(file, name, section.steps, section.continuous, apart)
             connections = [Connection.parse(text) for text in self.scenario.connections]
             supply = Supply(components, connections)
             for name, section in self.scenario.components.items():

@@ -6,6 +6,7 @@ import signal
 from collections.abc import Callable, Iterator
 from contextlib import contextmanager
 
+from orchestrator.coupling.fmu.channel import waiting
 from orchestrator.coupling.fmu.failure import FmuError
 from orchestrator.coupling.signals import interrupted_by, listening
 
@@ -38,5 +39,8 @@ def interruptible() -> Iterator[Callable[[float], None]]:
         if asked:
             raise Interruption(time, asked[0])
 
-    with listening(asked.append):
+    with (
+        listening(asked.append),
+        waiting(check),
+    ):  # an FMU in a process of its own may never come to a communication point
         yield check
