@@ -4,13 +4,13 @@ from __future__ import annotations
 
 import contextlib
 import os
-import tempfile
 import zipfile
 from pathlib import Path
 
 import fmpy
 
 from orchestrator.coupling.cache import prune, remove, used, user_folder
+from orchestrator.coupling.scratch import scratch
 
 FORMER = "fmu"
 """Where they were before version 0.2."""
@@ -22,9 +22,9 @@ def unzip(path: Path, sha256: str) -> Path:
     if not _is_whole(folder, path):
         prune(folder.parent)
         prune(folder.parent.with_name(FORMER))
-        with tempfile.TemporaryDirectory(dir=folder.parent) as scratch:
-            fmpy.extract(str(path), os.path.join(scratch, "fmu"))
-            _move(Path(scratch, "fmu"), folder, path)
+        with scratch(folder.parent) as place:
+            fmpy.extract(str(path), os.path.join(place, "fmu"))
+            _move(Path(place, "fmu"), folder, path)
     return used(folder)
 
 
