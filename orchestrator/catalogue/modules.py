@@ -9,6 +9,7 @@ from typing import Any
 from fmus.module import registry
 from fmus.module.variables import Bounds, Kind, ModuleError, Value, Variable
 from orchestrator.coupling.errors import InputError
+from orchestrator.coupling.reading import is_file
 
 
 def of_module(kind: str, robot: str | None = None) -> dict[str, Variable]:
@@ -80,7 +81,7 @@ def _start(text: str | None, kind: Kind) -> Value:
 
 def description(path: Path) -> Any:
     """Return FMPy's model description of the FMU at `path`; raise `InputError` if it is none."""
-    if not path.is_file():
+    if not is_file(path):
         raise InputError(f"{path}: no such file")
     if not zipfile.is_zipfile(path):
         raise InputError(f"{path}: not an FMU: not a zip archive")

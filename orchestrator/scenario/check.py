@@ -16,6 +16,7 @@ from orchestrator.catalogue.documents import Document, table_of
 from orchestrator.catalogue.quantities import Complaint, Scalar
 from orchestrator.coupling.errors import InputError, digits, nearest
 from orchestrator.coupling.masters.options import master_options, out_of_bounds
+from orchestrator.coupling.steps import number_of
 from orchestrator.scenario.over_time import OverTime, problems_of
 from orchestrator.scenario.types import DEFAULT_MASTER, UNITS, Provenance
 
@@ -173,7 +174,11 @@ def _step_problems(document: Document) -> Iterator[Complaint]:
     span = stop - start
     if not 0.0 < span < float("inf"):
         return
-    n = max(1, round(span / step))
+    try:
+        n = number_of(span, step)
+    except ValueError as error:
+        yield Complaint("simulation.macro_step", f"{digits(step)} s: {error}")
+        return
     if abs(n * step - span) > 1e-9 * span:
         what = f"stop_time {digits(stop)} s" if start == 0.0 else f"the {digits(span)} s from start_time to stop_time"
         yield Complaint("simulation.macro_step", f"{digits(step)} s does not divide {what}; {digits(span / n)} s does")

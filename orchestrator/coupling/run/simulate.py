@@ -19,6 +19,7 @@ from orchestrator.coupling.run.log import Log, Recorder
 from orchestrator.coupling.run.work import Work
 from orchestrator.coupling.stepping.master import Master
 from orchestrator.coupling.stepping.report import StepReport
+from orchestrator.coupling.steps import number_of
 
 DIVIDES = 1e-9  # how far (stop - start)/macro_step may be from a whole number
 
@@ -80,7 +81,7 @@ def steps_between(start: float, stop: float, H: float) -> tuple[int, float]:
         raise ValueError(f"macro step {H:g} s: must be positive")
     if not stop > start:
         raise ValueError(f"stop time {digits(stop)} s: must be after the start at {digits(start)} s")
-    n = max(round((stop - start) / H), 1)
+    n = number_of(stop - start, H)
     even, error = (stop - start) / n, abs(n * H - (stop - start)) / (stop - start)
     if error > DIVIDES:
         raise ValueError(f"macro step {digits(H)} s does not divide {digits(stop - start)} s; {digits(even)} s does")
