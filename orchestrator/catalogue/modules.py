@@ -85,10 +85,14 @@ def description(path: Path) -> Any:
         raise InputError(f"{path}: no such file")
     if not zipfile.is_zipfile(path):
         raise InputError(f"{path}: not an FMU: not a zip archive")
+    from orchestrator.coupling.fmu.archive import ArchiveError
     from orchestrator.coupling.fmu.description import parsed
+    from orchestrator.coupling.fmu.standard import DescriptionError
 
     try:
         return parsed(path)
+    except (ArchiveError, DescriptionError) as error:
+        raise InputError(f"{path}: not an FMU: {error}") from None
     except Exception as error:  # FMPy and lxml raise many kinds; each means the same to the user
         raise InputError(f"{path}: not an FMU: its modelDescription.xml cannot be read: {error}") from None
 

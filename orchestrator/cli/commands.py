@@ -127,6 +127,7 @@ def validate(scenario: options.Scenario, robot: options.Robot = None, set_: opti
         from orchestrator.api import load_scenario
         from orchestrator.landing.line_state import rest_words
         from orchestrator.runs.components import master_of, opened
+        from orchestrator.runs.foreign import executed
         from orchestrator.runs.systems import LandingSystem, resolve
 
     loaded = load_scenario(scenario, set=set_, robot=robot)
@@ -134,6 +135,7 @@ def validate(scenario: options.Scenario, robot: options.Robot = None, set_: opti
     with opened(system) as graph:
         master_of(loaded, graph)
         print(f"{scenario}: valid; {len(graph.components)} FMUs, {len(list(graph.connections))} connections")
+        print(executed(graph))
         for note in system.notes(graph):
             print(note)
     if isinstance(system, LandingSystem) and system.landing.rest is not None:

@@ -45,6 +45,7 @@ from orchestrator.landing.resolve import MESH_KEYS, MESH_TOLERANCE, Landing, Var
 from orchestrator.landing.resolve import resolve as resolve_landing
 from orchestrator.landing.safety import Limits, Safety, judge
 from orchestrator.landing.wiring import inner_step, lacking, landing_graph
+from orchestrator.runs.foreign import departing
 from orchestrator.scenario.over_time import courses, held
 from orchestrator.scenario.types import CableSection, Component, GraphScenario, LandingScenario, RobotSection, Scenario
 
@@ -167,7 +168,7 @@ class LandingSystem:
         lacks = zip(contacts, lacking(graph.components), strict=True)
         fallen = [_fallen_back(name, graph.components[name], self.exchange, what) for name, what in lacks]
         unfed = _unfed([n for n in names if not is_control(variable_of(n))])
-        return [*filter(None, fallen), *unfed, *_means_alone(graph)]
+        return [*filter(None, fallen), *unfed, *_means_alone(graph), *departing(graph, named)]
 
     def problem(self) -> Callable[[], Problem] | None:
         """Return what makes the monolithic problem; None where our modules cannot stand for a foreign FMU."""
@@ -279,7 +280,8 @@ class GraphSystem:
             if self._follows(name)
         ]
         said = [*filter(None, fallen), *_unfed(graph.unfed), *_means_alone(graph)]
-        return [*said, *self._discrete(graph), *self._below(graph), *_silent(graph)]
+        odd = departing(graph, self._foreign)
+        return [*said, *self._discrete(graph), *self._below(graph), *_silent(graph), *odd]
 
     @property
     def _foreign(self) -> dict[str, Component]:

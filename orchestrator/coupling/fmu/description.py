@@ -2,8 +2,8 @@
 
 from __future__ import annotations
 
-import hashlib
 import zipfile
+import zlib
 from dataclasses import dataclass
 from functools import lru_cache
 from pathlib import Path
@@ -12,7 +12,19 @@ from xml.etree import ElementTree
 
 import fmpy
 import numpy as np
-from fmpy.model_description import ModelDescription, ModelVariable
+from fmpy.model_description import ModelDescription, ModelVariable, ValidationError
+
+from orchestrator.coupling.fmu.archive import ArchiveError, files_of, hash_of
+from orchestrator.coupling.fmu.standard import (
+    MOST_BYTES,
+    DescriptionError,
+    parsed_xml,
+    require_consistent,
+    require_usable,
+)
+from orchestrator.coupling.reading import is_file
+
+NAME = "modelDescription.xml"
 
 Kind = Literal["real", "integer", "boolean", "string", "binary", "clock"]
 KINDS: dict[str, Kind] = {
@@ -94,48 +106,71 @@ def ports_of(variable: ModelVariable) -> list[Port]:
 
 def sha256_of(path: Path) -> str:
     """Return the SHA-256 of a file as hexadecimal digits."""
-    return hashlib.sha256(path.read_bytes()).hexdigest()
+    return hash_of(path)
 
 
 def parsed(path: Path) -> ModelDescription:
-    """Return FMPy's model description of an FMU; the same content is parsed once, whenever it was written."""
-    return _parsed(path, sha256_of(path))
+    """Return FMPy's model description of an FMU; the same content is parsed once, whenever it was written.
+
+    `ValueError` says what is wrong with the archive, or with the description.
+    """
+    return _parsed(path, sha256_of(path))[0]
+
+
+def departures(path: Path) -> tuple[str, ...]:
+    """Return where a description departs from the standard, by FMPy's validation; the FMU can be run all the same."""
+    return _parsed(path, sha256_of(path))[1]
 
 
 @lru_cache(maxsize=32)
-def _parsed(path: Path, sha256: str) -> ModelDescription:
-    description = fmpy.read_model_description(str(path), validate=False)
-    relative = _differences(path)
+def _parsed(path: Path, sha256: str) -> tuple[ModelDescription, tuple[str, ...]]:
+    root = _root(path)
+    require_usable(root)
+    try:
+        description, problems = fmpy.read_model_description(str(path), validate=True), ()
+    except ValidationError as error:
+        description, problems = fmpy.read_model_description(str(path), validate=False), tuple(error.problems)
+    require_consistent(description)
+    relative = _differences(root)
     for variable in description.modelVariables:
         stated, type_ = relative.get(variable.name), variable.declaredType
         variable.relativeQuantity = bool(type_ and type_.relativeQuantity) if stated is None else stated
-    return description
+    return description, problems
 
 
-def _differences(path: Path) -> dict[str, bool]:
+def _differences(root: ElementTree.Element) -> dict[str, bool]:
     """Return what the reals of a description say of ``relativeQuantity``; FMPy 0.3 does not find the attribute."""
     said: dict[str, bool] = {}
-    for variable in _model_description(path).iterfind("ModelVariables/*"):
+    for variable in root.iterfind("ModelVariables/*"):
         for element in (variable, *variable):
             if (text := element.get("relativeQuantity")) is not None:
                 said[variable.get("name", "")] = text in ("true", "1")
     return said
 
 
-def _model_description(path: Path) -> ElementTree.Element:
-    with zipfile.ZipFile(path) as archive, archive.open("modelDescription.xml") as file:
-        return ElementTree.parse(file).getroot()
+def _root(path: Path) -> ElementTree.Element:
+    """Return the root of the model description in an archive; `ValueError` says what is wrong with either."""
+    try:
+        with zipfile.ZipFile(path) as archive:
+            info = files_of(archive).get(NAME)
+            if info is None:
+                raise ArchiveError(f"its archive has no {NAME}; export the FMU anew")
+            if info.file_size > MOST_BYTES:
+                raise DescriptionError([f"it has {info.file_size / 2**20:.0f} MB, more than {MOST_BYTES // 2**20}"])
+            return parsed_xml(archive.read(info))
+    except (zipfile.BadZipFile, zlib.error, EOFError, UnicodeDecodeError, NotImplementedError, RuntimeError) as error:
+        raise ArchiveError(f"its archive is damaged: {error}; export the FMU anew") from None
 
 
 def read_description(path: Path) -> tuple[ModelDescription, str]:
     """Return model description and SHA-256 of an FMU; `ValueError` says what is wrong with it."""
-    if not path.is_file():
+    if not is_file(path):
         raise ValueError(f"{path}: no such file; build the FMUs, or correct the path")
     sha256 = sha256_of(path)
     try:
-        description = _parsed(path, sha256)
-    except Exception as error:
-        raise ValueError(f"{path}: not an FMU ({error})") from error
+        description, _ = _parsed(path, sha256)
+    except Exception as error:  # FMPy and lxml raise many kinds
+        raise ValueError(f"{path}: not an FMU: {error}") from error
     if description.coSimulation is None:
         raise ValueError(f"{path}: no co-simulation FMU; export it for co-simulation")
     if str(description.fmiVersion).startswith("1"):
@@ -147,14 +182,14 @@ def read_description(path: Path) -> tuple[ModelDescription, str]:
 
 def _read_capabilities(path: Path, interface: Any) -> None:
     """Write what an FMI 1.0 description says of its capabilities to FMPy's, which leaves them out."""
-    said = _model_description(path).find("Implementation/*/Capabilities")
+    said = _root(path).find("Implementation/*/Capabilities")
     for name in ("canHandleVariableCommunicationStepSize", "canBeInstantiatedOnlyOncePerProcess"):
         setattr(interface, name, said is not None and said.get(name) in ("true", "1"))
 
 
 def _provides_derivatives(path: Path) -> bool:
     """Return what an FMI 3.0 description says; FMPy 0.3 looks for the attribute under its name in FMI 2.0."""
-    interface = _model_description(path).find("CoSimulation")
+    interface = _root(path).find("CoSimulation")
     return interface is not None and interface.get("providesDirectionalDerivatives") in ("true", "1")
 
 
