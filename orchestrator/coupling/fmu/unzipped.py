@@ -36,7 +36,7 @@ def unzip(path: Path, sha256: str) -> Path:
         for kind in (KIND, HASHES, *FORMER):
             prune(folder.parent.with_name(kind))
         shrink(folder.parent, MOST_MEGABYTES)
-        with tempfile.TemporaryDirectory(dir=folder.parent) as scratch:
+        with tempfile.TemporaryDirectory(dir=folder.parent, prefix=f".{os.getpid()}-") as scratch:
             hashes = unpack(path, Path(scratch, "fmu"))
             _move(Path(scratch, "fmu"), hashes, folder)
     return used(folder)
