@@ -19,12 +19,14 @@ from fmus.robot.module import Robot
 from orchestrator.catalogue import modules as vocabulary
 from orchestrator.catalogue.robot_spec import RobotSpec, load_robot
 from orchestrator.coupling.course import Course
-from orchestrator.coupling.errors import InputError
+from orchestrator.coupling.errors import InputError, RunError
+from orchestrator.coupling.fmu.failure import FmuError
 from orchestrator.coupling.fmu.instance import Fmu
 from orchestrator.landing.contract import BREAKS, check_variables
 from orchestrator.landing.line_state import Rest, parameters_now, rest_of
 from orchestrator.landing.mesh import Mesh, mesh_of
 from orchestrator.landing.placement import Placement, place, wheels_along
+from orchestrator.scenario.isolation import isolation
 from orchestrator.scenario.over_time import courses, held
 from orchestrator.scenario.types import LandingScenario
 
@@ -172,14 +174,14 @@ def _mounts(scenario: LandingScenario, sources: Sources) -> dict[str, Value]:
     known = sources.variables["robot"]
     if scenario.robot.fmu is None or all(f"wheel[{k}].mount.x" in known for k in wheels):
         return {}
-    fmu = Fmu(scenario.robot.fmu, "robot")
     try:
-        fmu.set_parameters(scenario.robot.parameters)
-        fmu.enter_initialization(0.0)
-        fmu.exit_initialization()  # many FMUs know their outputs only now
-        return {f"wheel[{k}].mount.{axis}": _arm(fmu, k, axis) for k in wheels for axis in "xyz"}
-    finally:
-        fmu.close()
+        with Fmu(scenario.robot.fmu, "robot", isolate=isolation(scenario.robot, scenario.simulation)) as fmu:
+            fmu.set_parameters(scenario.robot.parameters)
+            fmu.enter_initialization(0.0)
+            fmu.exit_initialization()  # many FMUs know their outputs only now
+            return {f"wheel[{k}].mount.{axis}": _arm(fmu, k, axis) for k in wheels for axis in "xyz"}
+    except FmuError as error:
+        raise RunError(str(error), error.time) from None
 
 
 def _arm(fmu: Fmu, k: int, axis: str) -> float:

@@ -22,6 +22,7 @@ from orchestrator.coupling.graph.links import Connection
 from orchestrator.coupling.graph.supply import Missing, Supply
 from orchestrator.coupling.masters.options import master_options
 from orchestrator.landing.resolve import Landing
+from orchestrator.scenario.isolation import isolation
 
 TIGHTEST, LOOSEST = 1e-12, 1e-9
 """m; range of the tolerance of Newton's method in a landing."""
@@ -38,17 +39,18 @@ def landing_graph(landing: Landing, exchange: str) -> Graph:
     `waveform` becomes `hermite` where a contact does not get all means, `point` where a load's slope is not taken.
     """
     components: dict[str, Fmu] = {}
-    files = _files(landing)
+    files, scenario = _files(landing), landing.scenario
+    apart = {name: isolation(getattr(scenario, name), scenario.simulation) for name in ("cable", "robot", "contact")}
     try:
-        components["cable"] = instance(files["cable"], "cable", landing.cable.steps)
+        components["cable"] = instance(files["cable"], "cable", landing.cable.steps, isolate=apart["cable"])
         inner = (
             {} if landing.cable.foreign is not None else {"integration_step": inner_step(landing, EXCHANGES[exchange])}
         )
         components["cable"].set_parameters(inner | dict(landing.cable.settings))
-        components["robot"] = instance(files["robot"], "robot", landing.robot.steps)
+        components["robot"] = instance(files["robot"], "robot", landing.robot.steps, isolate=apart["robot"])
         components["robot"].set_parameters(landing.robot.settings)
         for k, s in enumerate(landing.placement.arc_lengths, start=1):
-            components[f"contact{k}"] = Fmu(files["contact"], f"contact{k}")
+            components[f"contact{k}"] = Fmu(files["contact"], f"contact{k}", isolate=apart["contact"])
             components[f"contact{k}"].set_parameters({**landing.contact.settings, "initial.s": s})
         for fmu in components.values():  # the contract says so, whether or not a unit does
             fmu.declare(name for name in fmu.ports if is_slope_of_load(name))

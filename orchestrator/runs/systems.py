@@ -46,6 +46,7 @@ from orchestrator.landing.resolve import resolve as resolve_landing
 from orchestrator.landing.safety import Limits, Safety, judge
 from orchestrator.landing.wiring import inner_step, lacking, landing_graph
 from orchestrator.runs.foreign import departing
+from orchestrator.scenario.isolation import isolation
 from orchestrator.scenario.over_time import courses, held
 from orchestrator.scenario.types import CableSection, Component, GraphScenario, LandingScenario, RobotSection, Scenario
 
@@ -258,7 +259,8 @@ class GraphSystem:
         try:
             for name, section in self.scenario.components.items():
                 file = section.fmu or library.module_fmu(str(section.model))
-                components[name] = instance(file, name, section.steps, section.continuous)
+                apart = isolation(section, self.scenario.simulation)
+                components[name] = instance(file, name, section.steps, section.continuous, apart)
             connections = [Connection.parse(text) for text in self.scenario.connections]
             supply = Supply(components, connections)
             for name, section in self.scenario.components.items():

@@ -67,7 +67,8 @@ class Simulation(Section):
     `tolerances`: the largest `relative_max_error` that `compare` lets pass, by signal.
 
     `estimate`: by which second run `run` estimates the error of those signals, if any (docs/concepts/error.md). `timeout`: wall
-    time that an FMU may take for one step or its initialisation; none: as long as it likes. `record`: the signals that are
+    time that an FMU may take for one step or its initialisation, and for any call in a process of its own; none: as long as it
+    likes. `memory_limit`: MB that an FMU may take in such a process. `record`: the signals that are
     kept, ``component.variable``, of any causality; none: all outputs.
     """
 
@@ -79,6 +80,7 @@ class Simulation(Section):
     tolerances: dict[str, Positive] = {}
     estimate: Literal["finer", "coarser", "none"] = "finer"
     timeout: Annotated[Positive | None, In("s")] = None
+    memory_limit: Positive | None = None
     record: Annotated[list[str], Field(min_length=1)] | None = None
 
     @property
@@ -135,10 +137,12 @@ class CableSection(Section):
 
     `conductor` is one of the catalogue, or a TOML file like those there; `stiffness_set` one of its sets. Without a
     conductor the latter is a label. What `parameters` of the same file give wins. `state`: how the line is strung.
-    `steps`, here and below: steps that the FMU makes in each step of the master (docs/reference/masters.md).
+    `steps`, here and below: steps that the FMU makes in each step of the master (docs/reference/masters.md). `isolate`, here and
+    below: whether the FMU lives in a process of its own; a foreign one does if nothing is said.
     """
 
     fmu: str | None = None
+    isolate: bool | None = None
     conductor: str | None = None
     stiffness_set: str = "unnamed"
     steps: Count = 1
@@ -154,6 +158,7 @@ class RobotSection(Section):
 
     model: str | None = None
     fmu: str | None = None
+    isolate: bool | None = None
     steps: Count = 1
     parameters: Settings = {}
     inputs: Inputs = {}
@@ -172,6 +177,7 @@ class ContactSection(Section):
     """
 
     fmu: str | None = None
+    isolate: bool | None = None
     stiffness_set: str | None = None
     parameters: Settings = {}
 
@@ -246,6 +252,7 @@ class Component(Section):
 
     model: str | None = None
     fmu: str | None = None
+    isolate: bool | None = None
     steps: Count = 1
     continuous: list[str] = []
     parameters: Settings = {}

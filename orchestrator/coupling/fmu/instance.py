@@ -9,7 +9,7 @@ from __future__ import annotations
 import atexit
 import contextlib
 import logging
-from collections.abc import Iterable, Mapping, Sequence
+from collections.abc import Callable, Iterable, Mapping, Sequence
 from dataclasses import replace
 from pathlib import Path
 from time import perf_counter
@@ -26,17 +26,21 @@ from orchestrator.coupling.fmu.binding import (
     ERROR,
     FATAL,
     LABELS,
+    LOST,
     ROUNDING,
     WARNING,
+    Fmi2,
+    Identity,
     SavedState,
     binding_of,
     finalize_python,
 )
 from orchestrator.coupling.fmu.description import Port, Value, capabilities_of, ports_of, read_description
 from orchestrator.coupling.fmu.driven import Driven
-from orchestrator.coupling.fmu.failure import NOT_FINITE, FmuEnd, FmuError
+from orchestrator.coupling.fmu.failure import CRASHED, NOT_FINITE, FmuEnd, FmuError
 from orchestrator.coupling.fmu.group import Group
-from orchestrator.coupling.fmu.messages import Messages
+from orchestrator.coupling.fmu.isolated import Isolated, Limits
+from orchestrator.coupling.fmu.messages import Messages, gist
 from orchestrator.coupling.fmu.python_modules import own_modules
 from orchestrator.coupling.fmu.saved_states import SavedStates
 from orchestrator.coupling.fmu.unzipped import unzip
@@ -57,6 +61,7 @@ class Fmu:
     path : the ``.fmu`` file
     name : instance name; the model's name if none is given
     continuous : real variables that it declares discrete, and are not
+    isolate : whether it lives in a process of its own (docs/reference/fmus.md), and within which limits
 
     Attributes
     ----------
@@ -72,9 +77,17 @@ class Fmu:
     busy_since : clock at which the running call began, 0 when none runs
     worst : highest FMI status that a call came back with, beyond warning
     abandoned : a call of this run was given up and may still return: nothing of it may be touched any more
+    limits : of its own process; None where it lives in ours
+    fate : status and words of the end of that process, once it has ended
     """
 
-    def __init__(self, path: str | Path, name: str | None = None, continuous: Iterable[str] = ()):
+    def __init__(
+        self,
+        path: str | Path,
+        name: str | None = None,
+        continuous: Iterable[str] = (),
+        isolate: bool | Limits = False,
+    ):
         self.path = Path(path)
         self.description, self.sha256 = read_description(self.path)
         self.name = name or str(self.description.modelName)
@@ -88,23 +101,31 @@ class Fmu:
         self.driven: Driven | None = None
         self._states = SavedStates()
         self.solves, self.wall, self.time, self.busy_since = 0, 0.0, 0.0, 0.0
+        self._begun: tuple[float, float, bool] | None = None
         self.stop = np.nan
         self.worst, self.initialized = 0, False
+        self.abandoned, self.fate = False, None
+        self.limits = isolate if isinstance(isolate, Limits) else Limits() if isolate else None
         _require_possible(self)
-        self.abandoned = False
-        binding = binding_of(str(self.description.fmiVersion))
         try:
             self.folder = unzip(self.path, self.sha256)
-            loaded = [other.folder for other in _instances]
-            with (
-                own_modules(self.folder, loaded),
-                contextlib.chdir("."),
-            ):  # FMPy stays in the library's folder if that cannot be loaded
-                self.fmi = binding(self.description, self.folder, self.name, self.log.add)
+            self.fmi = self._loaded()
+        except FmuError:
+            raise
         except Exception as error:
             hint = f" ({self.log.cause})" if self.log.cause else ""
             raise ValueError(f"{self.path}: the FMU cannot be loaded: {error}{hint}") from error
         _instances.append(self)
+
+    def _loaded(self) -> Fmi2 | Isolated:
+        """Load the library and make the instance, here or in a process of its own."""
+        identity = Identity.of(self.description)
+        if self.limits is not None:
+            return Isolated(identity, self.folder, self.name, self, 8 * len(self.ports), self.limits)
+        others = [other.folder for other in _instances if other.limits is None]
+        # FMPy stays in the library's folder if that cannot be loaded
+        with own_modules(self.folder, others), contextlib.chdir("."):
+            return binding_of(identity.version)(identity, self.folder, self.name, self.log.add)
 
     def __enter__(self) -> Self:
         return self
@@ -114,10 +135,23 @@ class Fmu:
 
     def error(self, status: int, doing: str, cure: str = "") -> FmuError:
         """Return the error for a call that came back with `status`."""
+        if status >= LOST:
+            return self._lost(doing)
         label = LABELS[status] if 0 <= status < len(LABELS) else f"unknown status {status}"
         self.worst = max(self.worst, status)
         known = status if DISCARD <= status <= FATAL else ERROR
         return self.failure(known, f"{doing} came back with {label}", cure)
+
+    def state_error(self, status: int, doing: str) -> FmuError:
+        """Return the error for a state that cannot be saved or taken back."""
+        return self.error(max(status, ERROR), doing, f"; {FORWARD}")
+
+    def _lost(self, doing: str) -> FmuError:
+        """Return the error for a call during which the FMU's process came to its end."""
+        self.worst = FATAL
+        status, what = self.fate or (CRASHED, "it has been closed")
+        said = f"; its last words: {gist(self.log.last)}" if self.log.last else ""
+        return FmuError(self.name, self.time, status, f"{doing}: {what}{said}")
 
     def failure(self, status: int, what: str, cure: str = "") -> FmuError:
         """Return the error that says `what` happened, with the FMU's own last words and a cure."""
@@ -143,6 +177,11 @@ class Fmu:
         if name not in self.ports:
             raise ValueError(f"{self.name}: no variable {name}{nearest(name, self.ports)}")
         return self.ports[name]
+
+    def limit(self, timeout: float) -> None:
+        """Let a call take no longer than `timeout` (s) from now on; only in a process of its own can that be made true."""
+        if isinstance(self.fmi, Isolated):
+            self.fmi.limit(timeout)
 
     def declare(self, names: Iterable[str]) -> None:
         """Take `names` for what they say, whatever their units: ``force_rate`` for the slope of ``force``."""
@@ -186,7 +225,7 @@ class Fmu:
 
     def twin(self) -> Fmu:
         """Return a second instance with the same parameters, not initialised."""
-        twin = Fmu(self.path, self.name, self.continuous)
+        twin = Fmu(self.path, self.name, self.continuous, self.limits or False)
         twin.set_parameters(self.parameters)
         if self.driven is not None:
             twin.follow(self.driven.courses, self.driven.taken)
@@ -223,7 +262,10 @@ class Fmu:
         """Return one variable, of any type (slow)."""
         port = self.port(name)
         if port.kind == "string":
-            return self.fmi.get_string(port.vr)
+            status, text = self.fmi.get_string(port.vr)
+            if status > WARNING:
+                raise self.error(status, f"reading {name}")
+            return text
         group = self.group([name])
         group.get()
         number = float(group.values[0])
@@ -250,13 +292,18 @@ class Fmu:
     def _call(self, doing: str, function: Any, *arguments: Any) -> None:
         self.log.begin()
         self.busy_since = perf_counter()
-        status = function(*arguments)
-        self.busy_since = 0.0
+        try:
+            status = function(*arguments)
+        finally:
+            self.busy_since = 0.0
         if status > WARNING:
             raise self.error(status, doing)
 
-    def step(self, t: float, h: float) -> None:
-        """Advance from `t` to `t + h` (s) with the inputs set before; a step that ends at the stop time ends there exactly."""
+    def begin(self, t: float, h: float) -> None:
+        """Start the step from `t` to `t + h` (s), where that can go on by itself; `step` then waits for its end."""
+        self._begin(t, h)
+
+    def _begin(self, t: float, h: float) -> None:
         if t + h != self.stop and abs(self.stop - t - h) <= ROUNDING * abs(self.stop):
             h = self.stop - t
         self.time = t
@@ -264,10 +311,22 @@ class Fmu:
         if self.driven is not None:
             self.driven.set_step(t, h)
         self.log.begin()
-        self.busy_since = clock = perf_counter()
-        status = self.fmi.do_step(t, h, self._states.none_before(t))
-        self.wall += perf_counter() - clock
-        self.busy_since = 0.0
+        made = t, h, self._states.none_before(t)
+        self.fmi.begin_step(*made)
+        self._begun = made
+
+    def step(self, t: float, h: float) -> None:
+        """Advance from `t` to `t + h` (s) with the inputs set before; a step that ends at the stop time ends there exactly."""
+        if self._begun is None:
+            self._begin(t, h)
+        assert self._begun is not None
+        (t, h, none_before), self._begun = self._begun, None
+        self.busy_since = perf_counter()
+        try:
+            status = self.fmi.do_step(t, h, none_before)
+        finally:
+            self.wall += self.fmi.took if self.limits else perf_counter() - self.busy_since
+            self.busy_since = 0.0
         if status == DISCARD and self.fmi.asks_for_the_end(t):
             raise FmuEnd(self.name, t)
         if status > WARNING:
@@ -286,7 +345,7 @@ class Fmu:
         state = SavedState()
         status = self.fmi.get_state(state)
         if status > WARNING:
-            raise self.error(max(status, ERROR), "saving the state", f"; {FORWARD}")
+            raise self.state_error(status, "saving the state")
         self._states.saved(state)
         return state
 
@@ -294,7 +353,7 @@ class Fmu:
         """Go back to a saved state (inputs too)."""
         status = self.fmi.set_state(state)
         if status > WARNING:
-            raise self.error(max(status, ERROR), "restoring the state", f"; {FORWARD}")
+            raise self.state_error(status, "restoring the state")
         self._states.restored(state)
 
     def release(self, state: SavedState) -> None:
@@ -307,11 +366,24 @@ class Fmu:
         if self.closed or self.busy_since:  # a call that hangs in there would not let this one through
             return
         _instances.remove(self)
-        _libraries.append(self.fmi.slave.dll)
         if self.initialized and self.worst < ERROR:
-            self.fmi.terminate()
+            self._bid("the end of the run", self.fmi.terminate)
         if self.worst < FATAL:
-            self.fmi.free()
+            self._bid("freeing it", self.fmi.free)
+        if isinstance(self.fmi, Isolated):
+            self.fmi.dismiss()
+        else:
+            _libraries.append(self.fmi.slave.dll)
+
+    def _bid(self, doing: str, call: Callable[[], int]) -> None:
+        """Make one of the last calls; the results are there, so that its failure is said in the log alone."""
+        try:
+            status = call()
+        except FmuError as error:
+            self.log.add(ERROR, error.message)
+        else:
+            if status > WARNING:
+                self.log.add(ERROR, self.error(status, doing).message)
 
 
 def _continuous(fmu: Fmu, name: str) -> Port:
@@ -331,10 +403,11 @@ def _require_possible(fmu: Fmu) -> None:
         has = f"it has {', '.join(there)}" if there else "it has none at all"
         raise ValueError(f"{fmu.path}: the FMU has no binary for {here} ({has}); export it for this platform")
     interface: Any = fmu.description.coSimulation
-    if interface.canBeInstantiatedOnlyOncePerProcess and any(other.sha256 == fmu.sha256 for other in _instances):
+    here_too = any(other.sha256 == fmu.sha256 for other in _instances if other.limits is None)
+    if interface.canBeInstantiatedOnlyOncePerProcess and fmu.limits is None and here_too:
         raise ValueError(
             f"{fmu.path}: can be instantiated only once per process, {fmu.name} would be the second, and a copy of the file "
-            "is the same FMU; export the model once more under another name (another modelIdentifier)"
+            "is the same FMU; give each a process of its own (isolate = true)"
         )
 
 

@@ -44,9 +44,9 @@ def simulate(
     record : signals to record (numbers of any type), ``component.variable``; None: every output, and every input that follows
         a course over time, by its value at the communication points
     on_step : called after every macro step
-    timeout : s of wall time that one call of an FMU may take. The run is then made in a thread of its own;
-        an FMU that hangs is left behind in it, and the caller should end the process (`os._exit`) once the
-        results are written.
+    timeout : s of wall time that one call of an FMU may take. One in a process of its own that takes longer is ended.
+        With others the run is made in a thread of its own; one that hangs is left behind in it, and the caller should end
+        the process (`os._exit`) once the results are written.
 
     Returns
     -------
@@ -67,7 +67,7 @@ def simulate(
     time[-1] = stop
     log = Log(master.NAME, macro_step, recorder.signals, time, values, units=recorder.units)
     simulation = _Simulation(graph, master, recorder, log, on_step)
-    if timeout is None:
+    if timeout is None or _limited(graph, timeout):
         simulation(start, stop)
     else:
         _watched(simulation, start, stop, timeout)
@@ -190,6 +190,13 @@ def _largest(energies: np.ndarray) -> float:
     return float(np.max(np.abs(booked))) if booked.size else np.nan
 
 
+def _limited(graph: Graph, timeout: float) -> bool:
+    """Limit the calls of those FMUs that have processes of their own; return whether all have."""
+    for fmu in graph.components.values():
+        fmu.limit(timeout)
+    return all(fmu.limits for fmu in graph.components.values())
+
+
 def _watched(simulation: _Simulation, start: float, stop: float, timeout: float) -> None:
     """Run in a thread; give up when one call of an FMU lasts longer than `timeout` (s)."""
     thread = threading.Thread(target=simulation, args=(start, stop), daemon=True)
@@ -212,6 +219,6 @@ def _watched(simulation: _Simulation, start: float, stop: float, timeout: float)
 
 
 def _hung(graph: Graph, timeout: float) -> list[Fmu]:
-    """Return the FMUs whose call has taken longer than `timeout` (s) by now."""
+    """Return the FMUs of this process whose call has taken longer than `timeout` (s) by now."""
     given = perf_counter() - timeout
-    return [fmu for fmu in graph.components.values() if 0.0 < fmu.busy_since < given]
+    return [fmu for fmu in graph.components.values() if fmu.limits is None and 0.0 < fmu.busy_since < given]
