@@ -13,6 +13,7 @@ import numpy as np
 from fmus.cable.mesh import TOLERANCE
 from orchestrator.catalogue import library
 from orchestrator.catalogue import modules as vocabulary
+from orchestrator.catalogue.modules import description
 from orchestrator.coupling.course import Course
 from orchestrator.coupling.errors import digits
 from orchestrator.coupling.exchange import (
@@ -27,6 +28,7 @@ from orchestrator.coupling.exchange import (
     suffixed,
     suited_to,
 )
+from orchestrator.coupling.fmu.description import structure_of
 from orchestrator.coupling.fmu.instance import Fmu
 from orchestrator.coupling.fmu.sub_steps import instance
 from orchestrator.coupling.graph.graph import Graph
@@ -260,7 +262,8 @@ class GraphSystem:
             for name, section in self.scenario.components.items():
                 file = section.fmu or library.module_fmu(str(section.model))
                 apart = isolation(section, self.scenario.simulation)
-                components[name] = instance(file, name, section.steps, section.continuous, apart)
+                structure = structure_of(description(Path(file)), section.parameters) if section.fmu else {}
+                components[name] = instance(file, name, section.steps, section.continuous, apart, structure)
             connections = [Connection.parse(text) for text in self.scenario.connections]
             supply = Supply(components, connections)
             for name, section in self.scenario.components.items():

@@ -4,6 +4,7 @@ from __future__ import annotations
 
 import zipfile
 import zlib
+from collections.abc import Mapping
 from dataclasses import dataclass
 from functools import lru_cache
 from pathlib import Path
@@ -20,11 +21,16 @@ from orchestrator.coupling.fmu.standard import (
     DescriptionError,
     parsed_xml,
     require_consistent,
+    require_sizes,
     require_usable,
 )
 from orchestrator.coupling.reading import is_file
 
 NAME = "modelDescription.xml"
+STRUCTURAL = "structuralParameter"
+"""Causality of what the dimensions of arrays hang on (FMI 3.0)."""
+Structure = Mapping[str, int]
+NO_STRUCTURE: Structure = {}
 
 Kind = Literal["real", "integer", "boolean", "string", "binary", "clock"]
 KINDS: dict[str, Kind] = {
@@ -77,19 +83,44 @@ class Capabilities:
     internal_step: float | None = None
 
 
-def element_names(variable: ModelVariable) -> list[str]:
+def shape_of(variable: ModelVariable, structure: Structure = NO_STRUCTURE) -> tuple[int, ...]:
+    """Return the lengths of an array along its dimensions; () of a scalar.
+
+    Parameters
+    ----------
+    structure : values of structural parameters; others have their start values
+    """
+    lengths = (
+        d.start if d.start is not None else structure.get(d.variable.name, d.variable.start)
+        for d in variable.dimensions
+    )
+    return tuple(int(length) for length in lengths)
+
+
+def element_names(variable: ModelVariable, structure: Structure = NO_STRUCTURE) -> list[str]:
     """Return the names of a variable's elements: ``x``, or ``x[1]``, ``x[2]`` …, or ``x[1,1]``, ``x[1,2]`` …"""
-    if not variable.shape:
+    shape = shape_of(variable, structure)
+    if not shape:
         return [variable.name]
-    places = np.ndindex(*variable.shape)
+    places = np.ndindex(*shape)
     return [f"{variable.name}[{','.join(str(i + 1) for i in place)}]" for place in places]
 
 
-def ports_of(variable: ModelVariable) -> list[Port]:
+def structure_of(description: ModelDescription, settings: Mapping[str, Any]) -> dict[str, int]:
+    """Return those of the `settings` that are structural parameters; `ValueError` where the arrays become too large."""
+    names = {v.name for v in description.modelVariables if v.causality == STRUCTURAL}
+    found = {n: int(x) for n, x in settings.items() if n in names and isinstance(x, int) and not isinstance(x, bool)}
+    if found:
+        require_sizes(description.modelVariables, lambda variable: shape_of(variable, found))
+    return found
+
+
+def ports_of(variable: ModelVariable, structure: Structure = NO_STRUCTURE) -> list[Port]:
+    """Return the scalar variables that a variable consists of; parameters as for `shape_of`."""
     kind = KINDS.get(variable.type, "integer")
     unit = variable.unit or (variable.declaredType.unit if variable.declaredType else None) or ""
-    size = int(np.prod(variable.shape)) if variable.shape else 1
-    names = element_names(variable)
+    names = element_names(variable, structure)
+    size = len(names)
     fixed = (
         unit,
         kind,

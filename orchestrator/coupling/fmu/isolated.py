@@ -8,7 +8,7 @@ from __future__ import annotations
 import json
 import os
 import sys
-from collections.abc import Callable
+from collections.abc import Callable, Sequence
 from dataclasses import dataclass
 from functools import partial
 from itertools import count
@@ -266,6 +266,10 @@ class Isolated:
         """Return whether a step from `t` that was discarded says that the simulation shall end there."""
         return self._called("asks_for_the_end", t, changes=False) == OK and bool(self._result)
 
+    def configure(self, values: Sequence[tuple[str, int, int]]) -> int:
+        """Set structural parameters, type, reference and value of each, in configuration mode."""
+        return self._called("configure", list(values))
+
     def enter_initialization(self, start: float, stop: float | None) -> int:
         """Set up the experiment and enter initialisation."""
         return self._called("enter_initialization", start, stop)
@@ -301,7 +305,9 @@ class Isolated:
 
     # -- what is said and heard -------------------------------------------------------------------------------
 
-    def _put(self, what: int, error: Late | None, key: int = 0, number: int = 0, t: float = 0.0, h: float = 0.0) -> None:
+    def _put(
+        self, what: int, error: Late | None, key: int = 0, number: int = 0, t: float = 0.0, h: float = 0.0
+    ) -> None:
         if not self._channel.room(0):
             self._exchange()
         self._channel.put(what, key, number, t, h)

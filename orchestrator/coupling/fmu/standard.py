@@ -9,7 +9,7 @@ from __future__ import annotations
 
 import re
 from collections import Counter
-from collections.abc import Callable, Iterator
+from collections.abc import Callable, Iterable, Iterator
 from math import prod
 from typing import Any
 from xml.etree import ElementTree
@@ -151,16 +151,23 @@ def _fits(kind: str) -> Callable[[str], bool] | None:
 def require_consistent(description: ModelDescription) -> None:
     """Raise `DescriptionError` where sizes, bounds or start values contradict one another."""
     problems = [f"variable {v.name!r} {problem}" for v in description.modelVariables for problem in _contradictions(v)]
-    elements = sum(prod(variable.shape) for variable in description.modelVariables if variable.shape)
-    if elements > MOST_ELEMENTS:
-        problems.append(f"its arrays have {elements:.3g} elements, more than {MOST_ELEMENTS:.0e}")
     if problems:
         raise DescriptionError(problems)
+    require_sizes(description.modelVariables, lambda variable: variable.shape or ())
+
+
+def require_sizes(variables: Iterable[ModelVariable], shape: Callable[[ModelVariable], tuple[int, ...]]) -> None:
+    """Raise `DescriptionError` where arrays of these shapes have no elements, or more than can be kept."""
+    shapes = {variable.name: shape(variable) for variable in variables}
+    empty = next((name for name, lengths in shapes.items() if any(length < 1 for length in lengths)), None)
+    if empty is not None:
+        raise DescriptionError([f"variable {empty!r} has the dimensions {shapes[empty]}; each is 1 at least"])
+    elements = sum(prod(lengths) for lengths in shapes.values() if lengths)
+    if elements > MOST_ELEMENTS:
+        raise DescriptionError([f"its arrays have {elements:.3g} elements, more than {MOST_ELEMENTS:.0e}"])
 
 
 def _contradictions(variable: ModelVariable) -> Iterator[str]:
-    if any(size < 1 for size in variable.shape or ()):
-        yield f"has the dimensions {variable.shape}; each is 1 at least"
     least, most = (
         _number(getattr(variable, name) or getattr(variable.declaredType, name, None)) for name in ("min", "max")
     )
