@@ -24,6 +24,8 @@ from orchestrator.coupling.fmu import instance
 from tests.scenarios import SCENARIOS
 
 STATUSES = (0, 1, 2, 3)
+FAULTS = f"*-{os.getpid()}-*.txt"
+"""Files of faults that this process has met."""
 PATIENCE = 60
 """s that a case may take; none takes one on an idle machine."""
 FMUS = Path(__file__).parent / "fmus"
@@ -58,7 +60,7 @@ def place() -> Iterator[Path]:
         here, temporary, given = (Path(outer, name) for name in ("here", "tmp", "given"))
         for folder in (here, temporary, given):
             folder.mkdir()
-        before = os.environ.get("TMPDIR"), tempfile.tempdir
+        before, faults = (os.environ.get("TMPDIR"), tempfile.tempdir), _own("crashes", FAULTS)
         os.environ["TMPDIR"] = tempfile.tempdir = str(temporary)
         stack.callback(_restore, *before)
         stack.enter_context(contextlib.chdir(here))
@@ -66,13 +68,13 @@ def place() -> Iterator[Path]:
         assert not [*here.iterdir()], "left in the current folder"
         assert not [*temporary.iterdir()], "left in the temporary folder"
         assert not instance._instances, "an FMU was not freed"
-        assert not _own("crashes", f"*-{os.getpid()}-*.txt"), "a fault of this program"
+        assert _own("crashes", FAULTS) == faults, "a fault of this program"
         assert not [*_own("unpacked", f".{os.getpid()}-*"), *_own("instances", f"{os.getpid()}-*")], "left in the cache"
 
 
 def _own(kind: str, pattern: str) -> list[Path]:
     """Return what this process has left in a folder of the cache."""
-    return [*user_folder(kind, plain=True).glob(pattern)]
+    return sorted(user_folder(kind, plain=True).glob(pattern))
 
 
 def _restore(variable: str | None, folder: str | None) -> None:

@@ -16,6 +16,7 @@ from hypothesis import strategies as st
 
 import orchestrator
 from orchestrator.coupling.errors import InputError
+from orchestrator.runs.components import opened
 from orchestrator.runs.files import load_comparison, load_run
 from tests.fmus import compiled, needs_compiler
 from tests.fuzzing import (
@@ -75,9 +76,12 @@ def every(size: int, numbers: tuple[int, int], cases: st.SearchStrategy[Any], ch
 
 @pytest.fixture(scope="module", autouse=True)
 def built() -> None:
-    """The FMUs of the cases, made before anybody looks at what is left in the temporary folder."""
+    """The FMUs and kernels of the cases, made before anybody looks at the clock, or at what is left in temporary folders."""
     for name in DESCRIBED:
         compiled(name)
+    for scenario in ("drop_5cm", "oscillator"):
+        with opened(orchestrator.load_scenario(scenario)):
+            pass
 
 
 @pytest.fixture(scope="module")
