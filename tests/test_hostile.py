@@ -102,7 +102,7 @@ FILES = [
     ({"binary": False}, "has no binary for"),
     ({"changes": [('fmiVersion="2.0"', 'fmiVersion="1.0"')]}, "not an FMU"),
     ({"changes": [("CoSimulation", "ModelExchange")]}, "export it for co-simulation"),
-    ({"changes": [ONCE]}, "can be instantiated only once per process"),
+    ({"changes": [ONCE], "more": "isolate = false"}, "can be instantiated only once per process"),
     ({"changes": [("<ModelVariables>", "<ModelVariables")]}, "modelDescription.xml cannot be read"),
     ({"changes": [('"canGetAndSetFMUstate="true"', ""), ('canGetAndSetFMUstate="true"', "")]}, "cannot save its state"),
 ]
@@ -112,9 +112,20 @@ FILES = [
 @pytest.mark.parametrize(("how", "message"), FILES, ids=[message for _, message in FILES])
 def test_an_fmu_that_cannot_be_used_is_refused_by_name(loop, orchestrate, tmp_path, how, message):
     path = packed(tmp_path / "a + b #1 ü.fmu", *how.get("changes", []), binary=how.get("binary", True))
-    loop.write_text(LOOP.format(path.name), encoding="utf-8")
+    more = how.get("more", "")
+    loop.write_text(
+        LOOP.format(path.name).replace("[components.q]", f"{more}\n[components.q]\n{more}"), encoding="utf-8"
+    )
     status, said = orchestrate("validate", loop)
     assert status == 2 and message in said
+
+
+@needs_compiler
+def test_an_fmu_for_once_per_process_runs_twice_in_two(loop, orchestrate, tmp_path):
+    packed(tmp_path / "once.fmu", ONCE)
+    loop.write_text(LOOP.format("once.fmu"), encoding="utf-8")
+    assert orchestrate("run", loop, "--out", tmp_path / "out", "--quiet", "--no-pictures")[0] == 0
+    assert json.loads((tmp_path / "out" / "manifest.json").read_text())["complete"] is True
 
 
 @needs_compiler

@@ -137,8 +137,8 @@ class CableSection(Section):
 
     `conductor` is one of the catalogue, or a TOML file like those there; `stiffness_set` one of its sets. Without a
     conductor the latter is a label. What `parameters` of the same file give wins. `state`: how the line is strung.
-    `steps`, here and below: steps that the FMU makes in each step of the master (docs/reference/masters.md). `isolate`, here and
-    below: whether the FMU lives in a process of its own; a foreign one does if nothing is said.
+    `steps`, here and below: steps that the FMU makes in each step of the master (docs/reference/masters.md). `isolate`, here
+    and below: whether the FMU lives in a process of its own; a foreign one does if nothing is said.
     """
 
     fmu: str | None = None

@@ -56,7 +56,7 @@ LOST = 1 << 32
 
 
 class Identity(NamedTuple):
-    """What of a description the calls need: of FMI the `version`, of the FMU `identifier`, `guid` and the `tool` that made it."""
+    """What of a description calls need: the `version` of FMI, the FMU's `identifier`, `guid` and the `tool` that made it."""
 
     version: str
     identifier: str

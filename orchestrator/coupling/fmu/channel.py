@@ -15,6 +15,7 @@ import os
 import select
 import tempfile
 from collections.abc import Callable, Iterator
+from contextlib import contextmanager
 from struct import Struct
 from time import perf_counter
 from typing import Any
@@ -24,8 +25,8 @@ HEADER = Struct("=iiqdd")
 DEFINE, SET, GET, PEEK, STEP, SAVE, RESTORE, FORGET, CALL = range(9)
 """What is done. PEEK is a GET that nobody has asked for yet: it spoils nothing if it fails."""
 WORD, TOOK, START = Struct("=q"), Struct("=d"), 64
-"""Places in the shared memory: 0, the number of the record that is being carried out; 8, s that the last step took; `START`, the
-first record."""
+"""Places in the shared memory: 0, the number of the record that is being carried out; 8, s that the last step took; `START`,
+the first record."""
 FINE, ENDS = b".", b"e"
 """All went well; and the FMU asks for the end of the simulation."""
 MESSAGE, PEEKED, RESULT = b"M", b"P", b"R"
@@ -40,6 +41,22 @@ class Ended(Exception):
 
 class TooLate(Exception):
     """There is no answer in time."""
+
+
+_waiting: list[Callable[[float], None]] = []
+
+
+@contextmanager
+def waiting(call: Callable[[float], None]) -> Iterator[None]:
+    """Let `call` be made, with the time of the FMU (s), again and again while the answer of one is waited for.
+
+    What it raises gives the FMU up: its process is ended.
+    """
+    _waiting.append(call)
+    try:
+        yield
+    finally:
+        _waiting.remove(call)
 
 
 def aligned(size: int) -> int:
@@ -64,23 +81,24 @@ def frame(kind: bytes, content: Any) -> bytes:
     return FRAME.pack(kind, len(text)) + text
 
 
-def frames(data: bytes) -> Iterator[tuple[bytes, bytes, int]]:
-    """Yield kind, content and end of each whole frame in `data`."""
-    place = 0
-    while place < len(data):
-        if data[place : place + 1] in (FINE, ENDS):
-            place += 1
-            yield data[place - 1 : place], b"", place
+def parted(data: bytes) -> tuple[list[tuple[bytes, bytes]], bytes]:
+    """Return kind and content of each whole frame in `data`, and what is left; `Ended` where it has no sense."""
+    found: list[tuple[bytes, bytes]] = []
+    while data:
+        if data[:1] in (FINE, ENDS):
+            found.append((data[:1], b""))
+            data = data[1:]
             continue
-        if len(data) - place < FRAME.size:
-            return
-        kind, length = FRAME.unpack_from(data, place)
+        if len(data) < FRAME.size:
+            break
+        kind, length = FRAME.unpack_from(data)
         if kind not in (MESSAGE, PEEKED, RESULT):
             raise Ended
-        if len(data) < place + FRAME.size + length:
-            return
-        place += FRAME.size + length
-        yield kind, data[place - length : place], place
+        if len(data) < FRAME.size + length:
+            break
+        found.append((kind, data[FRAME.size : FRAME.size + length]))
+        data = data[FRAME.size + length :]
+    return found, data
 
 
 class Channel:
@@ -90,7 +108,7 @@ class Channel:
     ----------
     largest : bytes of all variables of the FMU together
     printed : receives the lines that the process prints
-    idle : called again and again while an answer is waited for
+    time : returns the time of the FMU, s
 
     Attributes
     ----------
@@ -99,7 +117,7 @@ class Channel:
     timeout : s that an answer may take; None: as long as it likes
     """
 
-    def __init__(self, largest: int, printed: Callable[[str], None], idle: Callable[[], None]):
+    def __init__(self, largest: int, printed: Callable[[str], None], time: Callable[[], float]):
         self.answers = START + aligned(JOURNAL + 2 * largest)
         self.size = self.answers + aligned(JOURNAL + 2 * largest)
         self.shared = shared_memory(self.size)
@@ -107,7 +125,7 @@ class Channel:
         self.timeout: float | None = None
         self.end, self.deadline = START, 0.0
         self._end: int | None = None
-        self._printed, self._idle, self._text = printed, idle, b""
+        self._printed, self._time, self._text = printed, time, b""
         self._received, self._requests = os.pipe()
         self._inbox, self._answered = os.pipe()
         self._lines, self._prints = os.pipe()
@@ -198,7 +216,8 @@ class Channel:
             raise TooLate
         if ready and not ready & {self._inbox, self._lines}:
             raise Ended
-        self._idle()
+        for call in _waiting:
+            call(self._time())
 
     def _listen(self) -> None:
         """Take what the process prints, line by line."""

@@ -185,6 +185,10 @@ class _Life:
         self.fmi: Fmi2
         self.folder: Path
         self.freed = False
+        self.do: dict[int, Callable[..., tuple[int, int]]] = {
+            DEFINE: self.define, SET: self.set, GET: self.get, PEEK: self.peek, STEP: self.step,
+            SAVE: self.save, RESTORE: self.restore, FORGET: self.forget, CALL: self.call,
+        }  # fmt: skip
 
     def begin(self, birth: Birth) -> None:
         """Load the FMU and make the instance."""
@@ -228,7 +232,7 @@ class _Life:
             record = HEADER.unpack_from(self.memory, place)
             place += HEADER.size
             try:
-                status, size = self.DO[record[0]](self, place, *record[1:])
+                status, size = self.do[record[0]](place, *record[1:])
             except Exception as error:
                 self.hear(ERROR, f"{type(error).__name__}: {error}")
                 status, size = ERROR, 0
@@ -313,10 +317,6 @@ class _Life:
             return result, aligned(size)
         self.result = result
         return OK, aligned(size)
-
-    DO = {
-        DEFINE: define, SET: set, GET: get, PEEK: peek, STEP: step, SAVE: save, RESTORE: restore, FORGET: forget, CALL: call,
-    }  # fmt: skip
 
 
 def _derivative(fmi: Fmi2, unknown: list[int], known: list[int], seed: list[float], size: int) -> list[Any]:

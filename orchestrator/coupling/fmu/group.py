@@ -17,6 +17,7 @@ class Owner(Protocol):
     """What a group needs of the FMU that it belongs to."""
 
     name: str
+
     @property
     def fmi(self) -> Fmi2 | Isolated:
         """Its calls."""

@@ -471,7 +471,8 @@ def _require_possible(fmu: Fmu) -> None:
     if interface.canBeInstantiatedOnlyOncePerProcess and fmu.limits is None and here_too:
         raise ValueError(
             f"{fmu.path}: can be instantiated only once per process, {fmu.name} would be the second, and a copy of the file "
-            "is the same FMU; give each a process of its own (isolate = true)"
+            "is the same FMU; give each a process of its own (isolate = true), or export the model once more under another "
+            "name (another modelIdentifier)"
         )
 
 

@@ -37,7 +37,7 @@ from orchestrator.coupling.fmu.channel import (
     Ended,
     TooLate,
     aligned,
-    frames,
+    parted,
 )
 from orchestrator.coupling.fmu.child import Birth
 from orchestrator.coupling.fmu.failure import CRASHED, TIMEOUT, FmuError
@@ -73,6 +73,7 @@ class Owner(Protocol):
     """
 
     log: Messages
+    time: float
     fate: tuple[int, str] | None
 
     def error(self, status: int, doing: str) -> FmuError:
@@ -122,12 +123,14 @@ class Isolated:
         self._freeing = partial(owner.error, doing="freeing a state")
         self._reads: dict[int, _Read] = {}
         self._reading: list[_Read] = []
-        self._state, self._step, self._stepped, self._result = 0, 0, -1, None
-        self._channel = Channel(largest, owner.log.print, lambda: None)
+        self._state, self._step, self._stepped = 0, 0, -1
+        self._result: Any = None
+        self._channel = Channel(largest, owner.log.print, lambda: owner.time)
         self._channel.timeout = limits.timeout
         self._common = self._channel.answers
         self._free_place = self._common + aligned(largest)
         self._process = self._born(identity, folder, name)
+        self._memory_at_birth = 0.0
         self._require_loaded()
 
     def _born(self, identity: Identity, folder: Path, name: str) -> Process:
@@ -142,7 +145,8 @@ class Isolated:
 
     def _require_loaded(self) -> None:
         status = self._exchange()
-        self._memory_at_birth = self._result
+        if status == OK:
+            self._memory_at_birth = float(self._result)
         if status == LOST:
             error = self._owner.error(LOST, "loading it")
             self.dismiss()
@@ -227,6 +231,11 @@ class Isolated:
     def limit(self, timeout: float) -> None:
         """Let a call take no longer than `timeout`, s."""
         self._channel.timeout = timeout
+
+    @property
+    def pid(self) -> int:
+        """The number of its process."""
+        return self._process.pid
 
     @property
     def took(self) -> float:
@@ -372,8 +381,8 @@ class Isolated:
         if data == FINE:
             return -1, OK
         while True:
-            place = 0
-            for kind, content, place in frames(data):
+            found, rest = parted(data)
+            for kind, content in found:
                 if kind in (FINE, ENDS):
                     self.ends = kind == ENDS
                     return -1, OK
@@ -381,7 +390,7 @@ class Isolated:
                     number, status, self._result = json.loads(content)
                     return int(number), int(status)
                 self._take(kind, json.loads(content))
-            data = data[place:] + self._channel.receive()
+            data = rest + self._channel.receive()
 
     def _take(self, kind: bytes, content: Any) -> None:
         """Take a message, or what a value that was read ahead came back with."""
@@ -401,7 +410,7 @@ class Isolated:
         """Return what is to be said of its memory."""
         if self.limits.memory is None:
             return ""
-        had = memory - float(self._memory_at_birth or 0.0)
+        had = memory - self._memory_at_birth
         reached = f", of which it had {had:.0f}" if had > 0 else ""
         return f"; its memory is limited to {self.limits.memory:g} MB{reached} ([simulation] memory_limit)"
 

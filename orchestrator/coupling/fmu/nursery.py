@@ -1,8 +1,8 @@
 """How processes for FMUs come and go: forked from one that has loaded what they need, so that one costs milliseconds.
 
-That one, the nursery, is started with the first of them, and runs nothing of an FMU itself. It ends, and all its children with it,
-when the process that wants it has ended, however that was. Where the system cannot fork safely each child loads all for
-itself, which takes some tenths of a second.
+That one, the nursery, is started with the first of them, and runs nothing of an FMU itself. It ends, and all its children
+with it, when the process that wants it has ended, however that was. Where the system cannot fork safely each child loads all
+for itself, which takes some tenths of a second.
 """
 
 from __future__ import annotations
@@ -30,7 +30,9 @@ PATIENCE, GRACE = 2.0, 0.5
 """s that a process may take to end by itself; until those are ended that are left when nobody wants them any more."""
 MOST = 1 << 16
 """Bytes of a request or an answer."""
-START = "import sys, json; sys.path[:] = json.loads(sys.argv[1]); from orchestrator.coupling.fmu.{0} import {1}; {1}({2})"
+START = (
+    "import sys, json; sys.path[:] = json.loads(sys.argv[1]); from orchestrator.coupling.fmu.{0} import {1}; {1}({2})"
+)
 
 
 @dataclass(frozen=True)
@@ -73,7 +75,13 @@ class Process(Protocol):
 
 def born(descriptors: Sequence[int]) -> Process:
     """Return a new process that lives by these `descriptors` (`orchestrator.coupling.fmu.child.live`)."""
-    return _nursery().born(descriptors) if FORKS else _Spawned(descriptors)
+    if not FORKS:
+        return _Spawned(descriptors)
+    try:
+        return _nursery().born(descriptors)
+    except OSError:  # somebody has ended it
+        _one.clear()
+        return _nursery().born(descriptors)
 
 
 # -- on our side ----------------------------------------------------------------------------------------------
@@ -116,8 +124,10 @@ class _Child:
     nursery: _Nursery
 
     def end(self, patience: float) -> End:
-        code, killed, memory = self.nursery.ask({"end": self.pid, "patience": patience})
-        return End(code, killed, memory)
+        try:
+            return End(*self.nursery.ask({"end": self.pid, "patience": patience}))
+        except OSError:  # with the nursery its children are ended
+            return End(-signal.SIGKILL)
 
 
 class _Nursery:
@@ -128,6 +138,11 @@ class _Nursery:
         self._socket, self._turn, self.owner = ours, threading.Lock(), os.getpid()
         self._process = _started("nursery", "tend", [theirs.fileno()])
         theirs.close()
+
+    @property
+    def pid(self) -> int:
+        """The number of its process."""
+        return self._process.pid
 
     @property
     def alive(self) -> bool:

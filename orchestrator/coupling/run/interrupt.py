@@ -8,6 +8,7 @@ from collections.abc import Callable, Iterator
 from contextlib import contextmanager
 from typing import Any
 
+from orchestrator.coupling.fmu.channel import waiting
 from orchestrator.coupling.fmu.failure import FmuError
 
 
@@ -43,6 +44,7 @@ def interruptible() -> Iterator[Callable[[float], None]]:
 
     signal.signal(signal.SIGINT, ask)
     try:
-        yield check
+        with waiting(check):  # an FMU in a process of its own may never come to a communication point
+            yield check
     finally:
         signal.signal(signal.SIGINT, before)
