@@ -98,8 +98,8 @@ def in_time() -> Iterator[None]:
         signal.signal(signal.SIGALRM, before)
 
 
-def command(*arguments: object) -> str:
-    """Run a command; return what it says on stderr, once it has ended as a command may."""
+def command(*arguments: object) -> int:
+    """Run a command; return its exit status, once it has ended as a command may."""
     out, err = io.StringIO(), io.StringIO()
     status: Any = None
     with contextlib.redirect_stdout(out), contextlib.redirect_stderr(err), in_time():
@@ -110,7 +110,7 @@ def command(*arguments: object) -> str:
     said = err.getvalue()
     assert status in STATUSES and "Traceback" not in said + out.getvalue(), f"status {status}: {said[-3000:]}"
     assert status == 0 or said or out.getvalue(), "not a word"
-    return said
+    return int(status)
 
 
 # -- texts ------------------------------------------------------------------------------------------------------
@@ -139,9 +139,9 @@ def _value(draw: st.DrawFn, text: str, words: tuple[str, ...]) -> str:
 
 def _line(draw: st.DrawFn, text: str, words: tuple[str, ...]) -> str:
     """Leave out a line, or put it elsewhere once more."""
-    lines = text.splitlines()
+    lines = text.splitlines() or [""]
     i, j = draw(_pick(len(lines))), draw(_pick(len(lines)))
-    line = lines[i] if draw(st.booleans()) else lines.pop(i) if lines else ""
+    line = lines[i] if draw(st.booleans()) else lines.pop(i)
     return "\n".join([*lines[:j], line, *lines[j:]] if draw(st.booleans()) else lines) + "\n"
 
 
