@@ -69,7 +69,8 @@ def place() -> Iterator[Path]:
         assert not [*temporary.iterdir()], "left in the temporary folder"
         assert not instance._instances, "an FMU was not freed"
         assert _own("crashes", FAULTS) == faults, "a fault of this program"
-        assert not [*_own("unpacked", f".{os.getpid()}-*"), *_own("instances", f"{os.getpid()}-*")], "left in the cache"
+        left = [*_own("unpacked", f"line-landing-{os.getpid()}-*"), *_own("instances", f"{os.getpid()}-*")]
+        assert not left, "left in the cache"
 
 
 def _own(kind: str, pattern: str) -> list[Path]:

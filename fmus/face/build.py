@@ -221,7 +221,7 @@ def assemble(recipe: FmuRecipe) -> bytes:
     """Return the content of the FMU of `recipe`."""
     facts = record(recipe)
     bundle = make_bundle(recipe, facts["sources"])
-    with tempfile.TemporaryDirectory() as staging:
+    with tempfile.TemporaryDirectory(prefix=f"line-landing-{os.getpid()}-") as staging:
         for place, content in bundle.files.items():
             path = Path(staging, place)
             path.parent.mkdir(parents=True, exist_ok=True)
@@ -310,14 +310,13 @@ def pack(files: Mapping[str, bytes]) -> bytes:
 
 def write_atomically(path: Path, content: bytes) -> None:
     """Write `content` to `path`, all of it or nothing."""
-    handle, draft = tempfile.mkstemp(dir=path.parent, prefix=f".{path.name}.")
+    draft = path.with_name(f".{path.stem}.{os.getpid()}{path.suffix}")
     try:
-        with os.fdopen(handle, "wb") as file:
-            file.write(content)
-        os.chmod(draft, 0o644)
+        draft.write_bytes(content)
+        draft.chmod(0o644)
         os.replace(draft, path)
     except BaseException:
-        os.unlink(draft)
+        draft.unlink(missing_ok=True)
         raise
 
 

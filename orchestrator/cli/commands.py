@@ -1,8 +1,8 @@
 """The command line. Progress and errors go to stderr, answers to stdout.
 
 Exit status: 0 done and within tolerance; 1 done, but a tolerance or a safety limit is missed; 2 wrong input;
-3 the run failed; 70 a fault of this program; 130 interrupted. What is heavy is imported where it is used, so that
-``--help`` is quick.
+3 the run failed; 70 a fault of this program; 130 interrupted; 128 + the number of another signal that has ended it. What is
+heavy is imported where it is used, so that ``--help`` is quick.
 """
 
 from __future__ import annotations
@@ -19,13 +19,16 @@ import typer
 from typer.core import TyperGroup
 
 import orchestrator
-from orchestrator.cli import modes, new, options, printing
+from orchestrator.cli import modes, new, options, printing, streams
 from orchestrator.cli.identify import identify
 from orchestrator.cli.net import under_the_net
 from orchestrator.cli.start import importing
 from orchestrator.cli.sweep import sweep
+from orchestrator.coupling.signals import Stopped, ending
 from orchestrator.runs import last_net
 
+ANSWERS = ("list", "validate", "limits", "check")
+"""Commands that print, and leave nothing else: where their answer cannot be printed they have failed."""
 NO_PATH = (errno.ENAMETOOLONG, errno.ELOOP, errno.ENOTDIR, errno.EISDIR)
 """Of names that nothing can have there, and of folders in the place of files."""
 
@@ -38,8 +41,11 @@ class Commands(TyperGroup):
         warnings.simplefilter("once")  # a scenario may be read for every master and step
         warnings.showwarning = lambda message, *_: printing.complain(str(message))
         try:
-            return super().invoke(ctx)
-        except (Exception, KeyboardInterrupt) as error:
+            done = super().invoke(ctx)
+            if streams.lost() is not None and ctx.invoked_subcommand in ANSWERS:
+                raise typer.Exit(3)  # which says why in the end
+            return done
+        except (Exception, KeyboardInterrupt, Stopped) as error:
             status = _explained(error)
             if status is None and isinstance(error, EOFError):  # Typer would make status 1 of it
                 raise RuntimeError("EOFError: the end of a file or a pipe") from error
@@ -50,12 +56,15 @@ class Commands(TyperGroup):
 
 def _explained(error: BaseException) -> int | None:
     """Say on stderr what ended a command and return its exit status; None where that is for others to say."""
-    from orchestrator.coupling.errors import FAILED, INTERRUPTED, WRONG_INPUT, OrchestratorError
+    from orchestrator.coupling.errors import FAILED, INTERRUPTED, SIGNALLED, WRONG_INPUT, OrchestratorError
 
     if isinstance(error, OrchestratorError):
         for line in str(error).splitlines():
             printing.complain(line)
         return error.exit_status
+    if isinstance(error, Stopped):
+        printing.complain(str(error))
+        return SIGNALLED + error.number
     if isinstance(error, KeyboardInterrupt):
         printing.complain("interrupted")
         return INTERRUPTED
@@ -304,13 +313,18 @@ app.command()(sweep)
 
 @app.command()
 def report(
-    directory: Annotated[Path, typer.Argument(metavar="DIR", help="Directory of a finished run.")],
+    directory: Annotated[Path, typer.Argument(metavar="DIR", help="Directory of a run.")],
 ) -> None:
-    """Draw pictures and a page of finished results."""
+    """Draw pictures and a page of results: of a finished run, or of what an unfinished one has left so far."""
     with importing():
-        from orchestrator.report.page import report as make
+        from orchestrator.api import report_of
+        from orchestrator.coupling.run.results import read_json
 
-    print(make(directory))
+    page = report_of(directory)
+    manifest = page.parent / "manifest.json"
+    if manifest.is_file() and (error := read_json(manifest)["error"]) is not None:
+        printing.complain(f"{page.parent}: {error}")
+    print(page)
 
 
 def _numbers(text: str | None) -> list[float]:
@@ -332,7 +346,9 @@ def main(arguments: list[str] | None = None) -> None:
     last_net.noted.clear()
     try:
         with under_the_net(sys.argv[1:] if arguments is None else arguments):
-            app(arguments)
+            streams.forgive()
+            with ending():
+                app(arguments)
     except SystemExit as end:
         status = _status(end)
         if _left_behind():
@@ -342,12 +358,22 @@ def main(arguments: list[str] | None = None) -> None:
                     stream.flush()
             os._exit(status)
         raise SystemExit(status) from None
+    finally:
+        _say_what_is_lost()
 
 
 def _status(end: SystemExit) -> int:
     """Return how the process ends: as the command did, but never well where a worker met a fault of this program."""
     status = end.code if isinstance(end.code, int) else 0 if end.code is None else last_net.INTERNAL
     return last_net.INTERNAL if last_net.noted and status in (0, 1) else status
+
+
+def _say_what_is_lost() -> None:
+    """Say on stderr that answers could not be printed."""
+    if (failure := streams.lost()) is not None:
+        printing.complain(f"standard output: {failure.strerror}; what was to be printed is lost, results are kept")
+    with suppress(AttributeError, OSError, ValueError):  # closed
+        sys.stderr.flush()
 
 
 def _left_behind() -> bool:

@@ -60,7 +60,7 @@ class Audit:
     @property
     def residual(self) -> np.ndarray:
         """Sum of all terms over time, J: zero but for errors."""
-        return np.sum(list(self.terms.values()), axis=0)
+        return total(self.terms.values())
 
     @property
     def drift(self) -> float:
@@ -115,7 +115,16 @@ class Audit:
 
 def exchanged(terms: Mapping[str, np.ndarray]) -> float:
     """Return the energy (J) exchanged between `terms`, each (n,) and counted from the start."""
-    return float(np.max(0.5 * np.sum(np.abs(list(terms.values())), axis=0)))
+    return float(np.max(0.5 * total(map(np.abs, terms.values()))))
+
+
+def total(values: Iterable[np.ndarray]) -> np.ndarray:
+    """Return the sum of several (n,), one after the other: of a long run they have no second place in memory."""
+    left = iter(values)
+    found = np.array(next(left))
+    for one in left:
+        found += one
+    return found
 
 
 def missing(table: Table) -> list[str]:

@@ -263,6 +263,6 @@ def _batches() -> Batches:
         current_process().daemon = (
             False  # Dask's workers are daemons, which may have no children; this one ends with it
         )
-        _here.folder = tempfile.TemporaryDirectory(prefix="line-landing-")
+        _here.folder = tempfile.TemporaryDirectory(prefix=f"line-landing-{os.getpid()}-")
         _here.batches = Batches(Path(_here.folder.name), 1)
     return _here.batches

@@ -16,11 +16,12 @@ from orchestrator.coupling.errors import InputError
 from orchestrator.coupling.run.results import Table, plain, read_fields, read_json, read_table
 from orchestrator.runs.compare import Comparison
 from orchestrator.runs.directory import RunDirectory, manifest
+from orchestrator.runs.going_on import FOLDER, keep_signals
 from orchestrator.runs.result import Run
 
 FIELD_UNITS = {
     "time": "s", "arc_length": "m", "position": "m", "tension": "N",
-    "node_arc_length": "m", "node_position": "m", "node_slope": "1",
+    "node_arc_length": "m", "node_position": "m", "node_slope": "1", "tension_max": "N",
 }  # fmt: skip
 COUNTS = {"iterations": int, "subdivisions": int, "rejected": int, "columns": int, "converged": bool}
 """Columns of ``iterations.csv`` that are no real numbers."""
@@ -69,7 +70,7 @@ def write_unfinished(directory: RunDirectory, runs: Sequence[Run], error: str, v
 
 
 def _write_runs(directory: RunDirectory, runs: Sequence[Run], views: Views, error: str | None) -> list[Run]:
-    folders = [RunDirectory(directory.path / run.label) for run in runs]
+    folders = [RunDirectory.within(directory, run.label) for run in runs]
     for folder, run in zip(folders, runs, strict=True):
         _write_tables(folder, run)
     notes = _viewed(directory, runs[0], error, views)
@@ -83,6 +84,8 @@ def _write_tables(directory: RunDirectory, run: Run) -> None:
     directory.write_table("iterations.csv", run.iterations)
     if run.fields:
         directory.write_fields("fields.h5", run.fields, FIELD_UNITS)
+    if "tension_max" in run.fields:  # the shapes at some times; all are in this file
+        keep_signals(directory.path)
     if run.messages:
         directory.write_lines(FMU_LOG, run.messages)
     directory.write_json("summary.json", run.summary)
@@ -113,6 +116,11 @@ def _dependencies(run: Run) -> dict[str, Any]:
     return {name: value for name, value in run.manifest.items() if name not in ("complete", "error")}
 
 
+def write_end(directory: RunDirectory, first: Run, error: str, views: Views = NO_VIEWS) -> None:
+    """Write what stands beside the runs of a comparison that has died: page and manifest, with `error`."""
+    directory.write_manifest(_dependencies(first) | _viewed(directory, first, error, views), error)
+
+
 # -- reading --------------------------------------------------------------------------------------------------
 
 
@@ -130,8 +138,12 @@ def load_comparison(directory: Path | str) -> Comparison:
 
 def require_finished(directory: Path) -> None:
     """Raise `InputError` where `directory` is not that of a finished run or comparison."""
-    if not (directory / "manifest.json").is_file():
-        raise InputError(f"{directory}: no manifest.json; it is not the directory of a finished run")
+    if (directory / "manifest.json").is_file():
+        return
+    message = f"{directory}: no manifest.json; it is not the directory of a finished run"
+    if (directory / FOLDER).is_dir():
+        message += "; what an unfinished one has left is read by load_unfinished, and drawn by `orchestrator report`"
+    raise InputError(message)
 
 
 def read_run(directory: Path) -> Run:

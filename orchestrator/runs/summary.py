@@ -41,10 +41,12 @@ def manifest(scenario: Scenario, fmus: Mapping[str, Any]) -> dict[str, Any]:
 def summary(coupled: Coupled) -> dict[str, Any]:
     """Return what ``summary.json`` holds: verdict, cost, convergence, extremes of the signals, interface work."""
     log, scenario, about = coupled.log, coupled.scenario, coupled.system.about(coupled.table)
+    time = coupled.table["time"]
     return {
         "scenario": scenario.name,
         "title": scenario.title,
         "verdict": verdict(coupled),
+        "signal": signal_of(coupled),
         **safety(coupled),
         "notes": scenario.notes,
         "warnings": coupled.system.warnings(coupled.table),
@@ -54,6 +56,7 @@ def summary(coupled: Coupled) -> dict[str, Any]:
         "exchange": coupled.exchange or None,
         "exchange_asked": coupled.system.exchange or coupled.exchange or None,
         "macro_step": log.macro_step,
+        "output_interval": scenario.simulation.output_interval,
         **_cost(coupled),
         "left_the_groove": coupled.fallen,
         "unresolved_impacts": unresolved(coupled),
@@ -67,7 +70,7 @@ def summary(coupled: Coupled) -> dict[str, Any]:
         "interface_balance": interface_balance(coupled.table, log.energy),
         "fmu_warnings": {name: m.warnings for name, m in coupled.messages.items() if m.warnings},
         "units": {"time": "s"} | {name: log.units[name] for name in coupled.table if name in log.units},
-        "extremes": {n: extremes(log.time, coupled.table, n) for n in coupled.table if n != "time"},
+        "extremes": {n: extremes(time, coupled.table, n) for n in coupled.table if n != "time"},
     }
 
 
@@ -76,6 +79,12 @@ def verdict(coupled: Coupled) -> Verdict:
     if coupled.log.error is not None:
         return "interrupted" if isinstance(coupled.log.error, Interruption) else "failed"
     return "missed" if coupled.log.unconverged or coupled.fallen or coupled.misses else "within"
+
+
+def signal_of(coupled: Coupled) -> int | None:
+    """Return the number of the signal that has ended a run, or its estimate; None where none has."""
+    error = coupled.log.error
+    return error.number if isinstance(error, Interruption) else coupled.stopped or None
 
 
 def safety(coupled: Coupled) -> dict[str, Any]:
@@ -88,7 +97,7 @@ def safety(coupled: Coupled) -> dict[str, Any]:
 
 def _cost(coupled: Coupled) -> dict[str, Any]:
     log = coupled.log
-    simulated = float(log.time[-1] - log.time[0])
+    simulated = float(np.ptp(log.time))
     return {
         "simulated_s": simulated,
         "wall_s": log.wall,
@@ -108,10 +117,11 @@ def unresolved(coupled: Coupled) -> list[dict[str, Any]]:
     A macro step that was divided counts as the mean of its parts.
     """
     log, found = coupled.log, dict[str, dict[str, Any]]()
-    steps = log.macro_step / np.array([1.0 + step.subdivisions for step in log.steps])
+    steps = log.macro_step / (1.0 + log.steps.column("subdivisions"))
+    points, row = log.points, log.macro_step * log.every
     for impact in sorted(coupled.system.impacts(coupled.table), key=lambda impact: impact.period):
         rise = 0.25 * impact.period
-        during = (log.time[1:] > impact.time) & (log.time[:-1] < impact.time + log.macro_step + rise)
+        during = (points[1:] > impact.time) & (points[:-1] < impact.time + row + rise)
         longest = float(np.max(steps[during], initial=0.0))
         if longest > rise:
             found.setdefault(impact.contact, {**asdict(impact), "step": longest})

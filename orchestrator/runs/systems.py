@@ -35,11 +35,12 @@ from orchestrator.coupling.graph.graph import Graph
 from orchestrator.coupling.graph.links import Connection, owner_of, variable_of
 from orchestrator.coupling.graph.supply import Missing, Supply, chosen
 from orchestrator.coupling.masters import MASTERS
-from orchestrator.coupling.run.results import Table
+from orchestrator.coupling.run.columns import some_of
+from orchestrator.coupling.run.results import Fields, Table
 from orchestrator.landing import audit
 from orchestrator.landing.build import has_monolithic, problem
 from orchestrator.landing.contract import is_control, is_unused
-from orchestrator.landing.fields import cable_fields
+from orchestrator.landing.fields import SHAPES, cable_fields, tension_of
 from orchestrator.landing.geometry import geometry
 from orchestrator.landing.impacts import Impact, impacts
 from orchestrator.landing.limits import limits_of
@@ -56,7 +57,6 @@ if TYPE_CHECKING:
     from orchestrator.landing.monolithic import Problem
 
 INNER_STEP = "integration_step"
-Fields = dict[str, np.ndarray]
 Stepped = TypeVar("Stepped", CableSection, RobotSection, Component)
 
 
@@ -179,7 +179,7 @@ class LandingSystem:
 
     def split(self, table: Table) -> tuple[Fields, Table]:
         """Return the cable's shape and tension over time as arrays, and the table without them."""
-        rest = {name: values for name, values in table.items() if not name.startswith(("cable.shape[", "cable.node["))}
+        rest = some_of(table, [name for name in table if not name.startswith(SHAPES)])
         nodes = self.landing.mesh.nodes if self.landing.mesh is not None else None
         return cable_fields(table, self.landing.placement.cable_length, nodes), rest
 
@@ -216,7 +216,9 @@ class LandingSystem:
         fault: str | None = None,
     ) -> Safety:
         """Return the signals held against the limits; parameters as for `judge`."""
-        return judge(self.limits, table, fields.get("tension"), errors, fault)
+        simulation = self.scenario.simulation
+        apart = (simulation.output_interval or 0.0) if simulation.every > 1 else 0.0
+        return replace(judge(self.limits, table, tension_of(fields), errors, fault), apart=apart)
 
     def changed(self, options: Mapping[str, Any], **simulation: Any) -> LandingSystem:
         """Return it with other options of the master and other simulation settings; the start stays as it is."""

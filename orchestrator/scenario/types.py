@@ -69,7 +69,8 @@ class Simulation(Section):
     `estimate`: by which second run `run` estimates the error of those signals, if any (docs/concepts/error.md). `timeout`: wall
     time that an FMU may take for one step or its initialisation, and for any call in a process of its own; none: as long as it
     likes. `memory_limit`: MB that an FMU may take in such a process. `record`: the signals that are
-    kept, ``component.variable``, of any causality; none: all outputs.
+    kept, ``component.variable``, of any causality; none: all outputs. `output_interval`: s from row to row of the results,
+    a whole number of macro steps, twice that with ``estimate = "coarser"``; none: a row each communication point.
     """
 
     start_time: Annotated[float, In("s")] = 0.0
@@ -82,6 +83,12 @@ class Simulation(Section):
     timeout: Annotated[Positive | None, In("s")] = None
     memory_limit: Positive | None = None
     record: Annotated[list[str], Field(min_length=1)] | None = None
+    output_interval: Annotated[Positive | None, In("s")] = None
+
+    @property
+    def every(self) -> int:
+        """Macro steps from row to row of the results."""
+        return 1 if self.output_interval is None else max(round(self.output_interval / self.macro_step), 1)
 
     @property
     def duration(self) -> float:
@@ -92,6 +99,17 @@ class Simulation(Section):
     def _forward(self) -> Self:
         if not self.duration > 0.0:
             raise ValueError(f"stop_time {self.stop_time:g} s must be after the start at {self.start_time:g} s")
+        return self
+
+    @model_validator(mode="after")
+    def _whole(self) -> Self:
+        unit = (2.0 if self.estimate == "coarser" else 1.0) * self.macro_step
+        rows = 1.0 if self.output_interval is None else self.output_interval / unit
+        if abs(rows - round(rows)) > 1e-9 * rows or round(rows) < 1:
+            steps = 'macro steps, twice that with estimate = "coarser"' if unit > self.macro_step else "macro steps"
+            raise ValueError(
+                f"output_interval {self.output_interval:g} s must be a whole number of {steps}: of {unit:g} s"
+            )
         return self
 
 

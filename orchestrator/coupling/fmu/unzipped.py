@@ -10,12 +10,12 @@ import contextlib
 import json
 import os
 import shutil
-import tempfile
 from itertools import count
 from pathlib import Path
 
 from orchestrator.coupling.cache import prune, remove, shrink, used, user_folder
 from orchestrator.coupling.fmu.archive import Hashes, hash_of, unpack
+from orchestrator.coupling.scratch import is_running, scratch
 
 KIND, HASHES, OWN = "unpacked", "unpacked-hashes", "instances"
 """Folders of the user's: FMUs unzipped, the hashes of their files, copies for single instances."""
@@ -36,9 +36,9 @@ def unzip(path: Path, sha256: str) -> Path:
         for kind in (KIND, HASHES, *FORMER):
             prune(folder.parent.with_name(kind))
         shrink(folder.parent, MOST_MEGABYTES)
-        with tempfile.TemporaryDirectory(dir=folder.parent, prefix=f".{os.getpid()}-") as scratch:
-            hashes = unpack(path, Path(scratch, "fmu"))
-            _move(Path(scratch, "fmu"), hashes, folder)
+        with scratch(folder.parent) as place:
+            _note(unpack(path, place / "fmu"), place / "hashes", folder)
+            _move(place / "fmu", folder)
     return used(folder)
 
 
@@ -71,9 +71,8 @@ def _there(folder: Path) -> set[str]:
     return found
 
 
-def _move(made: Path, hashes: Hashes, folder: Path) -> None:
+def _move(made: Path, folder: Path) -> None:
     """Put what was `made` in the place of `folder`, unless another process was faster."""
-    _note(hashes, folder)
     for _ in range(2):
         with contextlib.suppress(OSError):
             os.rename(made, folder)
@@ -84,13 +83,11 @@ def _move(made: Path, hashes: Hashes, folder: Path) -> None:
     raise OSError(f"{folder}: cannot be replaced; remove it")
 
 
-def _note(hashes: Hashes, folder: Path) -> None:
-    """Write down the hashes of the files of `folder`, whole or not at all."""
-    place = _hashes(folder)
-    place.parent.mkdir(exist_ok=True)
-    with tempfile.NamedTemporaryFile("w", dir=place.parent, delete=False, encoding="utf-8") as file:
-        json.dump(hashes, file)
-    os.replace(file.name, place)
+def _note(hashes: Hashes, made: Path, folder: Path) -> None:
+    """Write down the hashes of the files of `folder`, whole or not at all; `made` is where they are written to."""
+    made.write_text(json.dumps(hashes), encoding="utf-8")
+    _hashes(folder).parent.mkdir(exist_ok=True)
+    os.replace(made, _hashes(folder))
 
 
 # -- a copy for one instance ------------------------------------------------------------------------------------
@@ -128,17 +125,5 @@ def _sweep(place: Path) -> None:
     """Remove the copies of processes that are no more."""
     for entry in place.iterdir():
         process = entry.name.partition("-")[0]
-        if process.isdecimal() and not _is_running(int(process)):
+        if process.isdecimal() and not is_running(int(process)):
             remove(entry)
-
-
-def _is_running(process: int) -> bool:
-    if os.name != "posix":  # elsewhere to ask is to end it
-        return True
-    try:
-        os.kill(process, 0)
-    except ProcessLookupError:
-        return False
-    except OSError:  # it is another user's
-        return True
-    return True

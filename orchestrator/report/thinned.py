@@ -1,0 +1,40 @@
+"""A long run as pictures show it: some of its points, with all extremes. No number is printed from it."""
+
+from __future__ import annotations
+
+from dataclasses import replace
+
+import numpy as np
+
+from orchestrator.coupling.run.results import Table
+from orchestrator.runs.result import Run
+
+MOST = 50_000
+"""Points that a curve of a picture may have: 30 for each of its pixels."""
+OF_STEPS = ("time", "iterations", "converged")
+"""What a picture shows of each macro step."""
+
+
+def thinned(run: Run) -> Run:
+    """Return `run`, or of one with more than `MOST` points every k-th and those at which a signal is least or largest."""
+    n = len(run.time)
+    if n <= MOST:
+        return run
+    rows = _rows(run.table, n)
+    fields = dict(run.fields)
+    if "tension_max" in fields:
+        fields["tension_max"] = fields["tension_max"][rows]
+    table = {name: values[rows] for name, values in run.table.items()}
+    steps = {name: run.iterations[name] for name in OF_STEPS}
+    return replace(run, table=table, iterations=steps, fields=fields)
+
+
+def _rows(table: Table, n: int) -> np.ndarray:
+    extremes = [row for values in table.values() for row in (int(np.argmin(values)), int(np.argmax(values)))]
+    return np.unique([*range(0, n, -(-n // MOST)), n - 1, *extremes])
+
+
+def left_out(shown: Run, run: Run) -> str:
+    """Return what a picture says of the points that are left out; empty where none are."""
+    few, all_ = len(shown.time), len(run.time)
+    return "" if few == all_ else f"{few} of {all_} points, all extremes among them"
