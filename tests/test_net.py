@@ -3,6 +3,7 @@
 from __future__ import annotations
 
 import os
+import shutil
 import subprocess
 import sys
 import threading
@@ -275,3 +276,54 @@ def test_modes_are_written_where_their_picture_fails(command: Command, tmp_path:
     status, said = command("modes", "rig_10m", "--without-robot", "--out", tmp_path / "out")
     assert status == 0 and "a picture is missing: RuntimeError: no font" in said
     assert (tmp_path / "out" / "modes.csv").is_file()
+
+
+# -- damaged run folders ----------------------------------------------------------------------------------------
+
+
+@pytest.fixture(scope="module")
+def whole(tmp_path_factory: pytest.TempPathFactory) -> Path:
+    """A finished run."""
+    out = tmp_path_factory.mktemp("whole") / "run"
+    orchestrator.run(OSCILLATOR, stop=0.05, estimate="none", out=out, pictures=False)
+    return out
+
+
+def a_pipe(path: Path) -> None:
+    path.unlink(missing_ok=True)
+    os.mkfifo(path)
+
+
+DAMAGED = {
+    "a pipe in the place of a table": ("results.csv", a_pipe, "is no regular file"),
+    "a pipe in the place of JSON": ("summary.json", a_pipe, "is no regular file"),
+    "no HDF5": ("fields.h5", lambda path: path.write_bytes(b"no"), "cannot be read"),
+    "a list in the place of a table": ("summary.json", lambda path: path.write_text("[]"), "holds no table but list"),
+    "JSON in JSON": ("summary.json", lambda path: path.write_text("[" * 10**5), "cannot be read"),
+    "half a row": ("iterations.csv", lambda path: path.write_text(path.read_text()[:-9]), "iterations.csv"),
+}
+
+
+@pytest.mark.parametrize("kind", DAMAGED)
+def test_a_damaged_run_is_refused_by_name(kind: str, whole: Path, tmp_path: Path):
+    name, damage, message = DAMAGED[kind]
+    copy = tmp_path / "run"
+    shutil.copytree(whole, copy)
+    damage(copy / name)
+    with pytest.raises(InputError, match=message) as found:
+        orchestrator.load_run(copy)
+    assert str(copy) in str(found.value)
+
+
+def test_a_log_with_bytes_that_are_no_text_is_read(whole: Path, tmp_path: Path):
+    shutil.copytree(whole, tmp_path / "run")
+    (tmp_path / "run" / "fmu.log").write_bytes(b"a: [ok] caf\xe9\n")
+    assert orchestrator.load_run(tmp_path / "run").messages == ["a: [ok] caf\ufffd"]
+
+
+def test_a_scenario_whose_name_is_no_text_runs(tmp_path: Path):
+    """Its path is in the manifest."""
+    path = tmp_path / os.fsdecode(b"caf\xe9.toml")
+    path.write_text(TEXT, encoding="utf-8")
+    run = orchestrator.run(path, stop=0.05, estimate="none", out=tmp_path / "out", pictures=False)
+    assert run.manifest["complete"] and orchestrator.load_run(tmp_path / "out").summary["title"] == run.summary["title"]

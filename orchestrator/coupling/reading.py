@@ -23,7 +23,9 @@ def text_of(path: Path, what: str) -> str:
     InputError : there is no such file, it is a folder or a pipe, too large, or no UTF-8
     """
     try:
-        _require_file(path, what)
+        require_file(path, what)
+        if path.stat().st_size > MOST:
+            raise InputError(f"{path}: has {path.stat().st_size / 2**20:.0f} MB; {what} may have {MOST // 2**20}")
         return path.read_text(encoding="utf-8-sig")
     except OSError as error:
         raise InputError(f"{path}: cannot be read ({error.strerror}); check the path") from None
@@ -41,11 +43,8 @@ def is_file(path: Path) -> bool:
         return False
 
 
-def _require_file(path: Path, what: str) -> None:
-    """Raise `InputError` where reading would not end, or not be worth it."""
-    found = path.stat()
-    if not S_ISREG(found.st_mode):
-        kind = "a folder" if S_ISDIR(found.st_mode) else "no regular file"
-        raise InputError(f"{path}: is {kind}; give {what}")
-    if found.st_size > MOST:
-        raise InputError(f"{path}: has {found.st_size / 2**20:.0f} MB; {what} may have {MOST // 2**20}")
+def require_file(path: Path, what: str) -> None:
+    """Raise `InputError` where reading would not end, `OSError` where nothing is there."""
+    mode = path.stat().st_mode
+    if not S_ISREG(mode):
+        raise InputError(f"{path}: is {'a folder' if S_ISDIR(mode) else 'no regular file'}; give {what}")
