@@ -14,6 +14,7 @@ from orchestrator.cli import commands
 from orchestrator.coupling.fmu import archive
 from orchestrator.coupling.fmu.archive import ArchiveError, files_of, unpack
 from orchestrator.coupling.fmu.description import departures, parsed, read_description
+from orchestrator.coupling.fmu.instance import Fmu
 from orchestrator.coupling.fmu.standard import DescriptionError
 from tests.fmus import compiled, described, needs_compiler
 
@@ -116,6 +117,19 @@ def test_an_archive_that_lies_about_a_size_or_is_damaged_is_refused(tmp_path: Pa
         path.write_bytes(changed)
         with pytest.raises(ArchiveError, match="its archive is damaged"):
             unpack(path, tmp_path / f"new{i}")
+
+
+@needs_compiler
+@pytest.mark.parametrize("isolate", [False, True])
+def test_an_fmu_whose_library_is_damaged_is_refused_and_leaves_nothing(isolate: bool, tmp_path: Path):
+    """The description can be read; what follows fails its checksum."""
+    content = bytearray(compiled("lag2").read_bytes())
+    with zipfile.ZipFile(compiled("lag2")) as file:
+        library = next(info for info in file.infolist() if info.filename.endswith(".so"))
+    content[library.header_offset + 2000] ^= 255
+    (tmp_path / "odd.fmu").write_bytes(content)
+    with pytest.raises(ValueError, match="cannot be loaded: its archive is damaged"):
+        Fmu(tmp_path / "odd.fmu", isolate=isolate)
 
 
 def test_an_archive_that_is_encrypted_is_refused(tmp_path: Path):

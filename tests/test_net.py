@@ -300,7 +300,7 @@ DAMAGED = {
     "no HDF5": ("fields.h5", lambda path: path.write_bytes(b"no"), "cannot be read"),
     "a list in the place of a table": ("summary.json", lambda path: path.write_text("[]"), "holds no table but list"),
     "JSON in JSON": ("summary.json", lambda path: path.write_text("[" * 10**5), "cannot be read"),
-    "half a row": ("iterations.csv", lambda path: path.write_text(path.read_text()[:-9]), "iterations.csv"),
+    "half a row": ("results.csv", lambda path: path.write_text(path.read_text() + "0.1,"), "results.csv"),
 }
 
 

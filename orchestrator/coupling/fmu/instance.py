@@ -119,6 +119,7 @@ class Fmu:
         self.stop = np.nan
         self.worst, self.initialized = 0, False
         self.abandoned, self.fate = False, None
+        self._own: Path | None = None
         self.limits = isolate if isinstance(isolate, Limits) else Limits() if isolate else None
         _require_possible(self)
         try:
