@@ -84,6 +84,50 @@ def test_a_fault_ends_with_status_3_and_what_there_is(loop, orchestrate, tmp_pat
         assert json.loads((out / "manifest.json").read_text())["complete"] is False
 
 
+APART = [  # call and fault of tests/fmus/hostile2.c, status, rows of results
+    (
+        "load crash",
+        3,
+        AT_ONCE,
+        "q, t = 0 s: loading it: its process was ended by SIGSEGV; its last words: [printed] about to crash",
+    ),
+    ("instantiate exit", 3, AT_ONCE, "q, t = 0 s: loading it: its process ended with exit code 0"),
+    ("exit hang", 3, AT_ONCE, "q, t = 0 s: end of initialisation: no answer within 2 s; raise the time-out?"),
+    ("step exit 0.045", 3, LATER, "q, t = 0.05 s: the step of 0.01 s: its process ended with exit code 0"),
+    ("get hang 0.045", 3, 5, "reading y: no answer within 2 s; raise the time-out?"),
+    ("free crash", 0, 11, "q: the FMU has warned 1 times"),
+]
+
+
+@needs_compiler
+@pytest.mark.parametrize(("hostile", "wanted", "rows", "message"), APART, ids=[a[0] for a in APART])
+def test_what_ends_its_process_is_said_and_costs_no_result(
+    loop, orchestrate, tmp_path, monkeypatch, hostile, wanted, rows, message
+):
+    monkeypatch.setenv("HOSTILE", hostile)
+    text = loop.read_text(encoding="utf-8").replace("parameters.gain = -1.0", "").split("[components.q]")
+    loop.write_text(f'{text[0]}[components.q]\nfmu = "{compiled("hostile2")}"\n', encoding="utf-8")
+    out = tmp_path / "out"
+    status, said = orchestrate(
+        "run", loop, "--master", "jacobi", "--out", out, "--quiet", "--timeout", 2, "--no-pictures"
+    )
+    assert status == wanted and message in said
+    assert out.exists() == (rows is not None)
+    if rows is not None:
+        assert len(read_table(out / "results.csv")["time"]) == rows
+        content = json.loads((out / "manifest.json").read_text())
+        assert content["complete"] is (wanted == 0) and content["fmus"]["q"]["isolated"] is True
+        assert wanted or "freeing it: its process was ended by SIGSEGV" in (out / "fmu.log").read_text()
+
+
+@needs_compiler
+def test_validate_says_who_has_a_process_of_its_own(loop, capsys):
+    for options, said in (([], "in processes of their own: p, q"), (["--set", "components.p.isolate=false"], "own: q")):
+        with pytest.raises(SystemExit):
+            cli.main(["validate", str(loop), *options])
+        assert said in capsys.readouterr().out
+
+
 def packed(path: Path, *changes: tuple[str, str], binary: bool = True) -> Path:
     """Write the test FMU ``lag2`` to `path` with parts of its description replaced."""
     with zipfile.ZipFile(compiled("lag2")) as old, zipfile.ZipFile(path, "w") as new:

@@ -145,6 +145,9 @@ def validate(scenario: options.Scenario, robot: options.Robot = None, set_: opti
         master_of(loaded, graph)
         print(f"{scenario}: valid; {len(graph.components)} FMUs, {len(list(graph.connections))} connections")
         print(executed(graph))
+        apart = [name for name, fmu in graph.components.items() if fmu.limits]
+        if apart:
+            print(f"in processes of their own: {', '.join(apart)}")
         for note in system.notes(graph):
             print(note)
     if isinstance(system, LandingSystem) and system.landing.rest is not None:

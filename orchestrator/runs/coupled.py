@@ -14,7 +14,7 @@ import numpy as np
 from orchestrator.coupling.errors import SIGNALLED, InputError, RunError, digits
 from orchestrator.coupling.exchange import coarsest
 from orchestrator.coupling.fmu.failure import FmuError
-from orchestrator.coupling.fmu.instance import FIXED, SHORTER
+from orchestrator.coupling.fmu.instance import FIXED, SHORTER, Fmu
 from orchestrator.coupling.fmu.messages import Messages
 from orchestrator.coupling.graph.graph import Graph
 from orchestrator.coupling.masters import StepReport
@@ -52,7 +52,7 @@ class Coupled:
     ----------
     table : signals at the communication points, ``time`` first
     fields : arrays over time as in ``fields.h5``; empty for a general graph
-    fmus : file and SHA-256 of every component
+    fmus : file and SHA-256 of every component, and whether it had a process of its own
     error_parts : estimated error of each signal judged; empty where no estimate was asked for
     estimate_failure : which parts of it failed, and why
     notes : what of the wiring its author may not expect, and who ended it before its time, a line each
@@ -66,7 +66,7 @@ class Coupled:
     log: Log
     table: Table
     fields: dict[str, np.ndarray]
-    fmus: dict[str, dict[str, str]]
+    fmus: dict[str, dict[str, str | bool]]
     error_parts: dict[str, Parts] = field(default_factory=dict)
     estimate_failure: str = ""
     notes: list[str] = field(default_factory=list)
@@ -127,7 +127,7 @@ def run_coupled(
     if isinstance(system, Scenario):
         system = resolve(system)
     with opened(system) as graph:
-        fmus = {n: {"file": str(f.path), "sha256": f.sha256} for n, f in graph.components.items()}
+        fmus = {name: _fmu(fmu) for name, fmu in graph.components.items()}
         exchange = coarsest(fmu.exchange for fmu in graph.components.values())
         notes = [*system.notes(graph), *_left_out(system.scenario)]
         about = _about(system.scenario, graph) | {"fmus": fmus, "exchange": exchange, "notes": notes}
@@ -135,10 +135,15 @@ def run_coupled(
             log = _simulated(system.scenario, graph, progress, folder)
             if log.error is not None and len(log.rows) < 2:
                 raise _at_the_start(log.error)
-        messages = {name: fmu.log for name, fmu in graph.components.items() if fmu.log.count}
+        logs = {name: fmu.log for name, fmu in graph.components.items()}
+    messages = {name: said for name, said in logs.items() if said.count}  # those of their end too
     fields, table = system.split(log.table)
     notes = [*notes, *([log.ended] if log.ended else [])]
     return Coupled(system, exchange, log, table, fields, fmus, notes=notes, messages=messages, folder=folder)
+
+
+def _fmu(fmu: Fmu) -> dict[str, str | bool]:
+    return {"file": str(fmu.path), "sha256": fmu.sha256, "isolated": fmu.limits is not None}
 
 
 def _left_out(scenario: Scenario) -> list[str]:

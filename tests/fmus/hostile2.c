@@ -18,8 +18,8 @@ static int leaks(void) {
     fprintf(stderr, "no memory is left\n");
     abort();
 }
-static void floods(Hostile *m) {
-    for (int i = 0; i < MANY; i++) {
+static void floods(Hostile *m, int lines) {
+    for (int i = 0; lines < 0 || i < lines; i++) {
         printf("line %d of many\n", i);
         if (m && m->log) m->log(NULL, "a", OK, "logAll", "message %d of many", i);
     }
@@ -42,8 +42,9 @@ static int in(const char *call, Hostile *m) {
     if (!strcmp(fault, "crash")) { fprintf(stderr, "about to crash in %s\n", call); *(volatile int *)8 = 1; }
     if (!strcmp(fault, "exit")) exit(0);
     if (!strcmp(fault, "exec")) execl("/bin/sleep", "sleep", "1000", (char *)NULL);
-    if (!strcmp(fault, "hang")) for (;;) {}
-    if (!strcmp(fault, "flood")) floods(m);
+    if (!strcmp(fault, "hang")) for (;;) pause();
+    if (!strcmp(fault, "flood")) floods(m, MANY);
+    if (!strcmp(fault, "pour")) floods(m, -1);
     if (!strcmp(fault, "leak")) leaks();
     if (!strcmp(fault, "cwd") && chdir("/")) abort();
     if (!strcmp(fault, "modes")) changes_modes();

@@ -209,13 +209,17 @@ class Channel:
         return min(SLICE_MS, max(1e3 * (self.deadline - perf_counter()), 0.0))
 
     def _look_around(self, ready: set[int]) -> None:
-        """Listen to what is printed; see whether the process is there, and in time."""
+        """Listen to what is printed; see whether the process is there."""
         if self._lines in ready:
             self._listen()
-        elif not ready and self.timeout is not None and perf_counter() >= self.deadline:
-            raise TooLate
-        if ready and not ready & {self._inbox, self._lines}:
+        elif ready and self._inbox not in ready:
             raise Ended
+        self.require_patience()
+
+    def require_patience(self) -> None:
+        """Raise `TooLate` if the time for an answer is over; ask who waits whether to go on."""
+        if self.timeout is not None and perf_counter() >= self.deadline:
+            raise TooLate
         for call in _waiting:
             call(self._time())
 

@@ -322,8 +322,8 @@ class _Life:
 def _derivative(fmi: Fmi2, unknown: list[int], known: list[int], seed: list[float], size: int) -> list[Any]:
     """Return the status of a directional derivative, and the derivative."""
     out = np.zeros(size)
-    references = (np.array(vr, dtype=np.uint32) for vr in (unknown, known))
-    status = fmi.directional_derivative(*references, np.array(seed), out)
+    of, by = (np.array(vr, dtype=np.uint32) for vr in (unknown, known))
+    status = fmi.directional_derivative(of, by, np.array(seed), out)
     return [status, out.tolist()]
 
 

@@ -52,6 +52,7 @@ from orchestrator.coupling.fmu.failure import CRASHED, NOT_FINITE, FmuEnd, FmuEr
 from orchestrator.coupling.fmu.group import Group
 from orchestrator.coupling.fmu.isolated import Isolated, Limits
 from orchestrator.coupling.fmu.messages import Messages, gist
+from orchestrator.coupling.fmu.nursery import POSSIBLE
 from orchestrator.coupling.fmu.python_modules import is_python, own_modules
 from orchestrator.coupling.fmu.saved_states import SavedStates
 from orchestrator.coupling.fmu.unzipped import RESOURCES, own_copy, unzip
@@ -118,9 +119,13 @@ class Fmu:
         self._begun: tuple[float, float, bool] | None = None
         self.stop = np.nan
         self.worst, self.initialized = 0, False
-        self.abandoned, self.fate = False, None
+        self.abandoned = False
+        self.fate: tuple[int, str] | None = None
         self._own: Path | None = None
         self.limits = isolate if isinstance(isolate, Limits) else Limits() if isolate else None
+        if self.limits and not POSSIBLE:
+            self.limits = None
+            self.log.add(WARNING, "there are no processes for FMUs on this system: it lives in ours")
         _require_possible(self)
         try:
             self.folder = self._own_folder(unzip(self.path, self.sha256))

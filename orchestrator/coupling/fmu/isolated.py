@@ -390,6 +390,7 @@ class Isolated:
                     number, status, self._result = json.loads(content)
                     return int(number), int(status)
                 self._take(kind, json.loads(content))
+            self._channel.require_patience()
             data = rest + self._channel.receive()
 
     def _take(self, kind: bytes, content: Any) -> None:

@@ -111,9 +111,18 @@ def _started(module: str, function: str, descriptors: Sequence[int]) -> subproce
         [sys.executable, "-c", code, json.dumps(sys.path)],
         stdin=subprocess.DEVNULL,
         stdout=subprocess.DEVNULL,
+        stderr=None if _is_open(2) else subprocess.DEVNULL,
         pass_fds=descriptors,
         start_new_session=True,
     )
+
+
+def _is_open(descriptor: int) -> bool:
+    try:
+        os.fstat(descriptor)
+    except OSError:
+        return False
+    return True
 
 
 @dataclass
