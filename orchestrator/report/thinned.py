@@ -6,6 +6,7 @@ from dataclasses import replace
 
 import numpy as np
 
+from orchestrator.coupling.run.columns import some_of
 from orchestrator.coupling.run.results import Table
 from orchestrator.runs.result import Run
 
@@ -20,18 +21,31 @@ def thinned(run: Run) -> Run:
     n = len(run.time)
     if n <= MOST:
         return run
-    rows = _rows(run.table, n)
+    rows = _rows(run.table)
     fields = dict(run.fields)
     if "tension_max" in fields:
         fields["tension_max"] = fields["tension_max"][rows]
-    table = {name: values[rows] for name, values in run.table.items()}
-    steps = {name: run.iterations[name] for name in OF_STEPS}
-    return replace(run, table=table, iterations=steps, fields=fields)
+    steps = some_of(run.iterations, OF_STEPS)
+    return replace(run, table=_at(run.table, rows), iterations=_at(steps, _steps(steps)), fields=fields)
 
 
-def _rows(table: Table, n: int) -> np.ndarray:
-    extremes = [row for values in table.values() for row in (int(np.argmin(values)), int(np.argmax(values)))]
-    return np.unique([*range(0, n, -(-n // MOST)), n - 1, *extremes])
+def _rows(table: Table) -> np.ndarray:
+    found = {row for name in table for row in _extremes(table[name])}
+    n = len(table["time"])
+    return np.unique([*range(0, n, -(-n // MOST)), n - 1, *found])
+
+
+def _extremes(values: np.ndarray) -> tuple[int, int]:
+    return int(np.argmin(values)), int(np.argmax(values))
+
+
+def _steps(table: Table) -> np.ndarray:
+    """Return the macro steps that are shown: every k-th, the extremes, and those that did not converge (so many at most)."""
+    return np.unique([*_rows(table), *np.flatnonzero(~table["converged"])[:MOST]])
+
+
+def _at(table: Table, rows: np.ndarray) -> Table:
+    return {name: table[name][rows] for name in table}
 
 
 def left_out(shown: Run, run: Run) -> str:

@@ -13,6 +13,7 @@ from typing import Any, TypeVar
 import numpy as np
 
 from orchestrator.coupling.errors import InputError, OrchestratorError
+from orchestrator.coupling.run.columns import Columns
 from orchestrator.coupling.run.results import Table, plain, read_fields, read_json, read_table
 from orchestrator.runs.compare import Comparison
 from orchestrator.runs.directory import RunDirectory, manifest
@@ -196,4 +197,6 @@ def read_comparison(directory: Path) -> Comparison:
 
 
 def _counted(table: Table) -> Table:
+    if isinstance(table, Columns):
+        return table.of_kinds({name: COUNTS[name] for name in table if name in COUNTS})
     return {name: np.asarray(values, dtype=COUNTS.get(name, float)) for name, values in table.items()}

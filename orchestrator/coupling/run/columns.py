@@ -11,7 +11,7 @@ import numpy as np
 from orchestrator.coupling.run.spool import Spool
 
 HELD = 2**26
-"""Bytes of rows that are held in memory; with a file, more are read from there."""
+"""Bytes of rows that are held in memory if nothing else is said."""
 PIECE = 2**19
 """Bytes of the rows that are written at a time, about."""
 
@@ -23,6 +23,7 @@ class Rows:
     ----------
     names : of the columns
     path : of the file; None: all is kept in memory
+    held : bytes of rows that are held in memory where there is a file; more are read from there
 
     Attributes
     ----------
@@ -30,14 +31,15 @@ class Rows:
     failure : why rows could not be written; `add` raises it
     """
 
-    def __init__(self, names: Sequence[str], path: Path | None = None):
+    def __init__(self, names: Sequence[str], path: Path | None = None, held: int | None = None):
         self.names = list(names)
         self.failure: Exception | None = None
         self.places = {name: place for place, name in enumerate(self.names)}
         size = max(16, min(4096, PIECE // (8 * max(len(self.names), 1))))
         self._open = np.empty((size, len(self.names)))
         self._filled = self._written = self._done = 0  # rows of the open piece, of these on disk; rows of pieces
-        self._held: list[np.ndarray] | None = []
+        self._held: list[np.ndarray] | None = None if held == 0 and path is not None else []
+        self._most = HELD if held is None else held
         self._spool = None if path is None else Spool(path, self.names)
         self._lock = threading.Lock()
 
@@ -95,7 +97,7 @@ class Rows:
                 self._held.append(self._open.copy())
             self._done += self._filled
             self._filled = self._written = 0
-            if self._spool is not None and self._done * self._open.itemsize * len(self.names) > HELD:
+            if self._spool is not None and self._done * self._open.itemsize * len(self.names) > self._most:
                 self._held = None
 
     @property
@@ -183,6 +185,10 @@ class Columns(Mapping[str, np.ndarray]):
     def among(self, names: Sequence[str]) -> Columns:
         """Return those of them that are named."""
         return Columns(self.rows, {name: self.names[name] for name in names}, self.kinds)
+
+    def of_kinds(self, kinds: Mapping[str, type]) -> Columns:
+        """Return them with other types."""
+        return Columns(self.rows, self.names, kinds)
 
     def pieces(self) -> Iterator[dict[str, np.ndarray]]:
         """Yield all columns piece by piece."""

@@ -128,7 +128,7 @@ def _on_disk(names: list[str], lines: Iterable[str]) -> Columns:
     """Return the columns of a table that is too long for memory: they are in a file that goes with them."""
     lines = iter(lines)
     with scratch() as folder:
-        rows = Rows(names, folder / "rows")
+        rows = Rows(names, folder / "rows", held=0)
         while piece := list(islice(lines, LINES)):
             rows.extend(np.loadtxt(piece, delimiter=",", ndmin=2).reshape(-1, len(names)))
         rows.flush()
