@@ -108,7 +108,7 @@ def test_scenarios(size: int):
             path.write_text(text, encoding="utf-8", errors="replace")
             command("validate", path)
 
-    every(size, (60, 3500), scenario_texts(GRAPH.format(compiled("lag2"))), check)
+    every(size, (50, 3500), scenario_texts(GRAPH.format(compiled("lag2"))), check)
 
 
 @pytest.mark.parametrize("size", SIZES)
@@ -118,7 +118,7 @@ def test_settings(size: int):
             (folder / "graph.toml").write_text(GRAPH.format(compiled("lag2")), encoding="utf-8")
             command("validate", folder / "graph.toml", *(option for text in texts for option in ("--set", text)))
 
-    every(size, (60, 2500), settings_texts, check)
+    every(size, (50, 2500), settings_texts, check)
 
 
 def looked_at(content: bytes) -> None:
@@ -135,14 +135,14 @@ def looked_at(content: bytes) -> None:
 def test_archives(size: int):
     content = compiled("lag2").read_bytes()
     more = MEMBERS.map(lambda members: with_members(content, members))
-    every(size, (40, 1500), damaged(content) | more | st.binary(max_size=60), looked_at)
+    every(size, (30, 1500), damaged(content) | more | st.binary(max_size=60), looked_at)
 
 
 @pytest.mark.parametrize("size", SIZES)
 def test_model_descriptions(size: int):
     texts = {name: (FMUS / f"{name}.xml").read_text(encoding="utf-8") for name in DESCRIBED}
     cases = st.sampled_from([*texts]).flatmap(lambda name: st.tuples(st.just(name), descriptions(texts[name])))
-    every(size, (40, 1500), cases, lambda case: looked_at(repacked(compiled(case[0]).read_bytes(), case[1])))
+    every(size, (30, 1500), cases, lambda case: looked_at(repacked(compiled(case[0]).read_bytes(), case[1])))
 
 
 @pytest.mark.parametrize("size", SIZES)
@@ -159,4 +159,4 @@ def test_run_folders(size: int, whole: Path, compared: Path):
             if data.draw(st.integers(0, 9)) == 0:
                 command("report", odd)
 
-    every(size, (30, 1000), st.data(), check)
+    every(size, (20, 1000), st.data(), check)
