@@ -184,12 +184,15 @@ def read(path: Path) -> Document:
         raise InputError(f"{path}: not {WHAT}: {error}{cure}") from None
 
 
-def chain(path: Path, find: Callable[[str, Path], Path]) -> list[tuple[Path, Document]]:
+def chain(
+    path: Path, find: Callable[[str, Path], Path], content: Callable[[Path], Document] = read
+) -> list[tuple[Path, Document]]:
     """Return the file at `path` and those that it extends, each with its content, the farthest base first.
 
     Parameters
     ----------
     find : what ``extends = "…"`` names, and the folder of the file in which it stands → the file's path
+    content : what a file says
     """
     found: list[tuple[Path, Document]] = []
     base: Path | None = path
@@ -199,7 +202,7 @@ def chain(path: Path, find: Callable[[str, Path], Path]) -> list[tuple[Path, Doc
             raise InputError(
                 f"{found[-1][0]}: {EXTENDS}: {circle} is a circle; extend a file that does not lead back here"
             )
-        document = read(base)
+        document = content(base)
         found.append((base, document))
         base = _base(base, document.pop(EXTENDS, None), find)
     return found[::-1]

@@ -26,7 +26,7 @@ def find(name_or_path: str | Path, beside: Path = Path()) -> Path:
     """Return the file of a scenario: a file that exists (relative to `beside`), else the shipped one of that name."""
     text = str(name_or_path)
     path = beside / text
-    if is_file(path):
+    if is_file(path) or is_file(beside / text.partition("#")[0]):  # of an archive, a variant
         return path
     if text in names():
         return folder() / f"{text}.toml"

@@ -20,6 +20,7 @@ from typer.core import TyperGroup
 
 import orchestrator
 from orchestrator.cli import modes, new, options, printing, streams
+from orchestrator.cli.export import export
 from orchestrator.cli.identify import identify
 from orchestrator.cli.net import under_the_net
 from orchestrator.cli.start import importing
@@ -310,6 +311,7 @@ def reproduce(
     raise typer.Exit(done.exit_status)
 
 
+app.command()(export)
 app.command()(identify)
 app.command()(sweep)
 

@@ -140,7 +140,20 @@ CONTACT = (
     _scalar("impulse", "output", "N.s", False, INSIDE),
     _scalar("touch_time", "output", "s", False, INSIDE),
 )
-CONTRACTS = {"robot": ROBOT, "cable": CABLE, "contact": CONTACT}
+CONTROLLER = (
+    _scalar("thrust", "output", "N", use="along z_B, into the robot's input of that name"),
+    Point("torque", "output", "N.m", False, use="to turn the robot, components in B"),
+    Point("body.position", "input", "m", False, use="where the robot is"),
+    Point("body.velocity", "input", "m/s", False, use="how fast it goes"),
+    Point("body.angular_velocity", "input", "rad/s", False, use="how fast it turns"),
+    _scalar("roll", "input", "rad", False, "how it is turned"),
+    _scalar("pitch", "input", "rad", False, "how it is turned"),
+    _scalar("yaw", "input", "rad", False, "how it is turned"),
+    _scalar("contact[k].normal_force", "input", "N", False, "to feel the line"),
+    _scalar("sample_time", "parameter", "s", False, "if it samples: macro steps have to divide it"),
+)
+"""Of its inputs it has those that it needs: any output of the robot by its name, any of contact k as ``contact[k].NAME``."""
+CONTRACTS = {"robot": ROBOT, "cable": CABLE, "contact": CONTACT, "controller": CONTROLLER}
 MOST_PORTS = 4
 BREAKS = ("missing", "wrong")
 """Verdicts with which a landing cannot run."""
@@ -153,7 +166,7 @@ def is_control(name: str) -> bool:
 
 def is_unused(name: str, wheels: int) -> bool:
     """Return whether a variable is that of a port beyond the last of the `wheels`."""
-    number = re.match(r"(?:port|wheel)\[(\d+)\]", name)
+    number = re.match(r"(?:port|wheel|contact)\[(\d+)\]", name)
     return bool(number and 0 < wheels < int(number[1]))
 
 
@@ -171,7 +184,7 @@ def check_fmu(path: Path, kind: str | None = None) -> tuple[str, list[Finding]]:
 
     Parameters
     ----------
-    kind : ``robot``, ``cable`` or ``contact``; without it the contract that the FMU's variables suit best
+    kind : ``robot``, ``cable``, ``contact`` or ``controller``; without it the contract that the FMU's variables suit best
     """
     description = vocabulary.description(path)
     known = vocabulary.of_fmu(path)
@@ -182,8 +195,13 @@ def check_fmu(path: Path, kind: str | None = None) -> tuple[str, list[Finding]]:
 
 
 def best_contract(known: dict[str, Variable]) -> str:
-    """Return the contract of which `known` has the most variables."""
-    return max(CONTRACTS, key=lambda kind: sum(n in known for p in CONTRACTS[kind] for n in p.names(1)))
+    """Return the contract of which `known` has the most variables, each an input, output or parameter as there."""
+
+    def alike(kind: str) -> int:
+        names = ((n, p.causality) for p in CONTRACTS[kind] for n in p.names(1))
+        return sum(n in known and known[n].causality == causality for n, causality in names)
+
+    return max(CONTRACTS, key=alike)
 
 
 def check_variables(kind: str, known: dict[str, Variable]) -> list[Finding]:

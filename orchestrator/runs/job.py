@@ -105,6 +105,8 @@ def _named(scenario: Scenario) -> dict[str, Any]:
     if isinstance(scenario, GraphScenario):
         return {name: _hash(section.fmu) for name, section in scenario.components.items() if section.fmu}
     sections = {"cable": scenario.cable, "robot": scenario.robot, "contact": scenario.contact}
+    if scenario.controller is not None:
+        sections["controller"] = scenario.controller
     found: dict[str, Any] = {name: _hash(section.fmu) for name, section in sections.items() if section.fmu}
     model = scenario.robot.model
     return found | ({"model": asdict(load_robot(model))} if model is not None and is_file(model) else {})

@@ -166,6 +166,8 @@ class LandingSystem:
         """Return another exchange than that asked for, and what nothing feeds; our cable and robot need no more than is fed."""
         contacts = [name for name in graph.components if name.startswith("contact")]
         foreign = {"cable": self.landing.cable.foreign, "robot": self.landing.robot.foreign}
+        if self.landing.controller is not None:
+            foreign["controller"] = self.landing.controller.foreign
         named = [*contacts, *(name for name, file in foreign.items() if file is not None)]
         names = [n for n in graph.unfed if owner_of(n) in named and not is_unused(variable_of(n), len(contacts))]
         lacks = zip(contacts, lacking(graph.components), strict=True)

@@ -112,6 +112,8 @@ def _why_not(system: LandingSystem) -> str:
 
     if system.problem() is None:
         return "the monolithic solver cannot stand for an FMU of this landing"
+    if system.landing.controller is not None:
+        return "a controller flies this landing, which the solver in the page does not have"
     return why_not(system.landing.robot.courses)
 
 

@@ -44,7 +44,7 @@ def known_variables(document: Document) -> tuple[Known, list[Complaint]]:
 
 def _sections(document: Document) -> Iterator[tuple[str, str, Document]]:
     """Yield path, kind (of a landing) and content of every section that stands for an FMU."""
-    for kind in ("cable", "robot", "contact"):
+    for kind in ("cable", "robot", "contact", "controller"):
         if isinstance(document.get(kind), dict):
             yield kind, kind, document[kind]
     for name, section in table_of(document, "components").items():
@@ -53,9 +53,9 @@ def _sections(document: Document) -> Iterator[tuple[str, str, Document]]:
 
 
 def _own(kind: str, section: Document) -> dict[str, Variable]:
-    """Return the variables of our own module: a landing's `kind`, or a component's `model`."""
+    """Return the variables of our own module: a landing's `kind`, or the `model` of a component or a controller."""
     model = section.get("model")
-    if kind:
+    if kind and kind != "controller":
         return vocabulary.of_module(kind, model if kind == "robot" and isinstance(model, str) else None)
     if isinstance(model, str) and model not in registry.names():
         raise InputError(f"no model {model!r}{nearest(model, registry.names())}")
@@ -113,6 +113,7 @@ def check(document: Document, known: Known) -> Iterator[Complaint]:
     yield from _step_problems(document)
     yield from _position_problems(document, known)
     yield from _limit_problems(document)
+    yield from _controller_problems(document, known)
 
 
 def _section_problems(path: str, section: Document, known: Mapping[str, Variable]) -> Iterator[Complaint]:
@@ -219,3 +220,22 @@ def _limit_problems(document: Document) -> Iterator[Complaint]:
     for here, there in (SPACING, SPACING[::-1]):
         if here in limits and there not in limits:
             yield Complaint(f"limits.{here}", f"says nothing without limits.{there}; give both")
+
+
+def _controller_problems(document: Document, known: Known) -> Iterator[Complaint]:
+    """Yield a model that is no controller, and inputs of the robot that the scenario gives beside it."""
+    section = document.get("controller")
+    if not isinstance(section, dict):
+        return
+    model = section.get("model")
+    if isinstance(model, str) and model in registry.names() and registry.find(model).contract != "controller":
+        yield Complaint("controller.model", f"{model} is no controller{nearest(model, controllers())}")
+    outputs = [v.name for v in known.get("controller", {}).values() if v.causality == "output"]
+    for name in table_of(table_of(document, "robot"), "inputs"):
+        if name in outputs:
+            yield Complaint(f"robot.inputs.{name}", "is what the controller gives; leave it out, or the controller")
+
+
+def controllers() -> list[str]:
+    """Return the modules that can play the part of a controller."""
+    return [key for key, entry in registry.MODULES.items() if entry.contract == "controller"]

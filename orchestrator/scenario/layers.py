@@ -22,12 +22,15 @@ from orchestrator.catalogue.documents import (
     leaves,
     merged,
     parsed,
+    read,
 )
 from orchestrator.catalogue.scenarios import find
 from orchestrator.coupling.errors import InputError
 from orchestrator.coupling.masters.options import master_options
 from orchestrator.scenario import line_state
 from orchestrator.scenario.named_sets import make_room
+from orchestrator.scenario.ssp.archive import is_structure
+from orchestrator.scenario.ssp.document import document as of_structure
 from orchestrator.scenario.types import DEFAULT_MASTER
 
 NAMED_TABLES = ("parameters", "inputs", "tolerances")
@@ -38,7 +41,15 @@ SET = "--set"
 def files(path: Path) -> tuple[Stack, list[str]]:
     """Return the scenario file at `path` over those that it extends, and what is to be said of it."""
     stack, notes = Stack(), []
-    for file, document in chain(path, find):
+
+    def content(file: Path) -> Document:
+        if not is_structure(file):
+            return read(file)
+        document, said = of_structure(file)
+        notes.extend(said)
+        return document
+
+    for file, document in chain(path, find, content):
         named = named_tables(document)
         resolve_paths(named, file.parent)
         notes += lay(stack, named, str(file))
@@ -73,7 +84,7 @@ def _make_room(document: Document, above: Document) -> list[str]:
 
 def _sections(document: Document) -> Iterator[tuple[str, ...]]:
     """Yield the places of the sections that may name a model or an FMU."""
-    for key in ("cable", "robot", "contact"):
+    for key in ("cable", "robot", "contact", "controller"):
         if key in document:
             yield (key,)
     components = document.get("components")

@@ -200,6 +200,23 @@ class ContactSection(Section):
     parameters: Settings = {}
 
 
+class ControllerSection(Section):
+    """What flies the robot: a module of ours or of an installed package (`model`), or any FMU of the contract (`fmu`).
+
+    Where it has the parameters mass, gravity, inertia.xx …, max_thrust, they are the robot's unless given.
+    """
+
+    model: str | None = None
+    fmu: str | None = None
+    parameters: Settings = {}
+
+    @model_validator(mode="after")
+    def _one_controller(self) -> ControllerSection:
+        if (self.model is None) == (self.fmu is None):
+            raise ValueError('give either model = "setdown" or fmu = "FILE.fmu"')
+        return self
+
+
 class LandingSection(Section):
     """Where and how the robot comes down.
 
@@ -348,11 +365,12 @@ class _Common(Section):
 
 
 class LandingScenario(_Common):
-    """A robot comes down on a cable: cable, robot, one contact a wheel, and where they meet."""
+    """A robot comes down on a cable: cable, robot, one contact a wheel, what flies it if anything does, where they meet."""
 
     cable: CableSection
     robot: RobotSection
     contact: ContactSection = ContactSection()
+    controller: ControllerSection | None = None
     landing: LandingSection
     limits: LimitsSection = LimitsSection()
 
