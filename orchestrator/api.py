@@ -376,8 +376,16 @@ def _directory(out: Out, name: str) -> Iterator[RunDirectory | None]:
 
 
 def _views(pictures: bool) -> Views:
-    if not pictures:
-        return NO_VIEWS
-    from orchestrator.report import drawing, page
+    return Views(_pictures, _page) if pictures else NO_VIEWS
 
-    return Views(drawing.draw, page.write)
+
+def _pictures(directory: Path) -> None:
+    from orchestrator.report import drawing  # a library for pictures that cannot be loaded costs the pictures alone
+
+    drawing.draw(directory)
+
+
+def _page(directory: Path, manifest: Mapping[str, Any]) -> None:
+    from orchestrator.report import page
+
+    page.write(directory, manifest)

@@ -45,7 +45,7 @@ def remove_left_overs() -> None:
     """Remove what killed processes have left in the temporary folder and in that of unzipped FMUs."""
     remove_orphans()
     with suppress(OSError):
-        remove_orphans(user_folder("unzipped", plain=True))
+        remove_orphans(user_folder("unpacked", plain=True))
 
 
 def remove_parts(folder: Path) -> None:

@@ -25,7 +25,7 @@ from pebble import ProcessExpired, ProcessPool
 from fmus.face.first_use import compile_modules
 from fmus.kernels.jit import is_compiled
 from orchestrator.coupling.errors import InputError
-from orchestrator.runs import cluster, worker
+from orchestrator.runs import cluster, last_net, worker
 from orchestrator.runs.job import Done, Job, code_version, found, make, remove_half_done
 from orchestrator.scenario.types import LandingScenario
 
@@ -148,7 +148,7 @@ class Batches:
             return
         pool = self._started(solvers)
         futures: dict[Future[None], str] = {
-            pool.schedule(make, args=(job, self.store), timeout=limit): key for key, job in left.items()
+            pool.schedule(worker.guarded, args=(make, job, self.store), timeout=limit): key for key, job in left.items()
         }
         for future in as_completed(futures):
             yield futures[future], future
@@ -213,6 +213,9 @@ def _failure(error: BaseException | None) -> str | None:
         case ProcessExpired():
             return f"its process died (exit code {error.exitcode}); run the scenario alone to see why"
         case cluster.LostError():
+            return str(error)
+        case last_net.InternalError():
+            last_net.noted.append(str(error))
             return str(error)
         case OSError() if error.errno in NO_ROOM:
             raise error

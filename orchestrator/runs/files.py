@@ -8,11 +8,11 @@ from __future__ import annotations
 from collections.abc import Callable, Sequence
 from dataclasses import dataclass, replace
 from pathlib import Path
-from typing import Any
+from typing import Any, TypeVar
 
 import numpy as np
 
-from orchestrator.coupling.errors import InputError
+from orchestrator.coupling.errors import InputError, OrchestratorError
 from orchestrator.coupling.run.columns import Columns
 from orchestrator.coupling.run.results import Table, plain, read_fields, read_json, read_table
 from orchestrator.runs.compare import Comparison
@@ -128,13 +128,34 @@ def write_end(directory: RunDirectory, first: Run, error: str, views: Views = NO
 def load_run(directory: Path | str) -> Run:
     """Return the result of the finished run in `directory`; `InputError` if there is none."""
     require_finished(Path(directory))
-    return read_run(Path(directory))
+    return undamaged(Path(directory), read_run)
 
 
 def load_comparison(directory: Path | str) -> Comparison:
     """Return the finished comparison in `directory`; `InputError` if there is none."""
     require_finished(Path(directory))
-    return read_comparison(Path(directory))
+    return undamaged(Path(directory), read_comparison)
+
+
+Read = TypeVar("Read")
+
+
+def undamaged(directory: Path, read: Callable[[Path], Read]) -> Read:
+    """Return what `read` makes of a directory; `InputError` where it is damaged, whatever that comes to."""
+    try:
+        return read(directory)
+    except OrchestratorError:
+        raise
+    except Exception as error:  # a file of another kind, half a table, a missing key
+        raise InputError(f"{directory}: damaged results ({type(error).__name__}: {error}); run it again") from error
+
+
+def _said(path: Path) -> dict[str, Any]:
+    """Return the content of a JSON file that is a table."""
+    content = read_json(path)
+    if not isinstance(content, dict):
+        raise InputError(f"{path}: holds no table but {type(content).__name__}; run it again")
+    return content
 
 
 def require_finished(directory: Path) -> None:
@@ -154,15 +175,15 @@ def read_run(directory: Path) -> Run:
         read_table(directory / "results.csv"),
         _counted(read_table(directory / "iterations.csv")),
         read_fields(directory / "fields.h5"),
-        read_json(directory / "summary.json"),
-        read_json(manifest) if manifest.is_file() else {},
+        _said(directory / "summary.json"),
+        _said(manifest) if manifest.is_file() else {},
         directory,
         _lines(directory / FMU_LOG),
     )
 
 
 def _lines(path: Path) -> list[str]:
-    return path.read_text(encoding="utf-8").splitlines() if path.is_file() else []
+    return path.read_text(encoding="utf-8", errors="replace").splitlines() if path.is_file() else []
 
 
 def read_comparison(directory: Path) -> Comparison:

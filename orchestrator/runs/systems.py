@@ -13,6 +13,7 @@ import numpy as np
 from fmus.cable.mesh import TOLERANCE
 from orchestrator.catalogue import library
 from orchestrator.catalogue import modules as vocabulary
+from orchestrator.catalogue.modules import description
 from orchestrator.coupling.course import Course
 from orchestrator.coupling.errors import digits
 from orchestrator.coupling.exchange import (
@@ -27,6 +28,7 @@ from orchestrator.coupling.exchange import (
     suffixed,
     suited_to,
 )
+from orchestrator.coupling.fmu.description import structure_of
 from orchestrator.coupling.fmu.instance import Fmu
 from orchestrator.coupling.fmu.sub_steps import instance
 from orchestrator.coupling.graph.graph import Graph
@@ -47,6 +49,7 @@ from orchestrator.landing.resolve import resolve as resolve_landing
 from orchestrator.landing.safety import Limits, Safety, judge
 from orchestrator.landing.trial.remembered import said
 from orchestrator.landing.wiring import inner_step, lacking, landing_graph
+from orchestrator.runs.foreign import departing
 from orchestrator.scenario.isolation import isolation
 from orchestrator.scenario.over_time import courses, held
 from orchestrator.scenario.types import CableSection, Component, GraphScenario, LandingScenario, RobotSection, Scenario
@@ -171,7 +174,7 @@ class LandingSystem:
         lacks = zip(contacts, lacking(graph.components), strict=True)
         fallen = [_fallen_back(name, graph.components[name], self.exchange, what) for name, what in lacks]
         unfed = _unfed([n for n in names if not is_control(variable_of(n))])
-        return [*filter(None, fallen), *unfed, *_means_alone(graph), *self._untried(graph)]
+        return [*filter(None, fallen), *unfed, *_means_alone(graph), *departing(graph, named), *self._untried(graph)]
 
     def _untried(self, graph: Graph) -> Iterator[str]:
         """Yield which foreign FMUs have not passed a trial, as far as one is remembered."""
@@ -271,7 +274,8 @@ class GraphSystem:
             for name, section in self.scenario.components.items():
                 file = section.fmu or library.module_fmu(str(section.model))
                 apart = isolation(section, self.scenario.simulation)
-                components[name] = instance(file, name, section.steps, section.continuous, apart)
+                structure = structure_of(description(Path(file)), section.parameters) if section.fmu else {}
+                components[name] = instance(file, name, section.steps, section.continuous, apart, structure)
             connections = [Connection.parse(text) for text in self.scenario.connections]
             supply = Supply(components, connections)
             for name, section in self.scenario.components.items():
@@ -293,7 +297,8 @@ class GraphSystem:
             if self._follows(name)
         ]
         said = [*filter(None, fallen), *_unfed(graph.unfed), *_means_alone(graph)]
-        return [*said, *self._discrete(graph), *self._below(graph), *_silent(graph)]
+        odd = departing(graph, self._foreign)
+        return [*said, *self._discrete(graph), *self._below(graph), *_silent(graph), *odd]
 
     @property
     def _foreign(self) -> dict[str, Component]:

@@ -16,7 +16,8 @@ from orchestrator.catalogue.documents import Document, table_of
 from orchestrator.catalogue.quantities import Complaint, Scalar
 from orchestrator.coupling.errors import InputError, digits, nearest
 from orchestrator.coupling.masters.options import master_options, out_of_bounds
-from orchestrator.scenario.over_time import OverTime, problems_of
+from orchestrator.coupling.steps import number_of
+from orchestrator.scenario.over_time import OverTime, is_tunable, problems_of
 from orchestrator.scenario.types import DEFAULT_MASTER, UNITS, Provenance
 
 Known = Mapping[str, Mapping[str, Variable]]
@@ -34,7 +35,8 @@ def known_variables(document: Document) -> tuple[Known, list[Complaint]]:
     for path, kind, section in _sections(document):
         fmu = section.get("fmu")
         try:
-            known[path] = vocabulary.of_fmu(Path(fmu)) if isinstance(fmu, str) else _own(kind, section)
+            settings = table_of(section, "parameters")
+            known[path] = vocabulary.of_fmu(Path(fmu), settings) if isinstance(fmu, str) else _own(kind, section)
         except InputError as error:
             problems += [Complaint(f"{path}.{'fmu' if fmu else 'model'}", problem) for problem in error.problems]
     return known, problems
@@ -119,12 +121,23 @@ def _section_problems(path: str, section: Document, known: Mapping[str, Variable
         names = [v.name for v in known.values() if v.causality == causality]
         for name, value in table_of(section, group).items():
             place = f"{path}.{group}.{name}"
-            if name in names:
+            if name in known and is_tunable(known[name]) and (misplaced := _misplaced(group, value)):
+                yield Complaint(place, misplaced)
+            elif name in names or (name in known and is_tunable(known[name])):
                 yield from _value_problems(place, known[name], value)
             elif name in known:
                 yield Complaint(place, f"is no {causality}; its causality is {known[name].causality}")
             else:
                 yield Complaint(place, f"unknown key{nearest(name, names)}")
+
+
+def _misplaced(group: str, value: Any) -> str:
+    """Return what is wrong with the table in which a tunable parameter stands; empty if nothing is."""
+    if group == "parameters" and isinstance(value, OverTime):
+        return "is a tunable parameter; its table stands in inputs"
+    if group == "inputs" and not isinstance(value, OverTime):
+        return "is a parameter; one value for it stands in parameters, a table in inputs"
+    return ""
 
 
 def _value_problems(path: str, variable: Variable, value: Any) -> Iterator[Complaint]:
@@ -174,7 +187,11 @@ def _step_problems(document: Document) -> Iterator[Complaint]:
     span = stop - start
     if not 0.0 < span < float("inf"):
         return
-    n = max(1, round(span / step))
+    try:
+        n = number_of(span, step)
+    except ValueError as error:
+        yield Complaint("simulation.macro_step", f"{digits(step)} s: {error}")
+        return
     if abs(n * step - span) > 1e-9 * span:
         what = f"stop_time {digits(stop)} s" if start == 0.0 else f"the {digits(span)} s from start_time to stop_time"
         yield Complaint("simulation.macro_step", f"{digits(step)} s does not divide {what}; {digits(span / n)} s does")

@@ -10,6 +10,8 @@ from typing import Any
 
 from orchestrator.catalogue import shelf
 from orchestrator.catalogue.documents import (
+    DEEPEST,
+    TOO_DEEP,
     Document,
     Stack,
     bare,
@@ -19,6 +21,7 @@ from orchestrator.catalogue.documents import (
     is_whole,
     leaves,
     merged,
+    parsed,
     read,
 )
 from orchestrator.catalogue.scenarios import find
@@ -189,13 +192,13 @@ def override(stack: Stack, texts: Iterable[str], folder: Path) -> list[str]:
 
     Together they are one file, the last; `folder` is what paths in them are relative to.
     """
-    parsed = [_parsed(text) for text in texts]
+    changes = [_parsed(text) for text in texts]
     together: Document = {}
-    for _, tables, given in parsed:
+    for _, tables, given in changes:
         together = merged(together, _within(tables, given))
     resolve_paths(together, folder)
     notes = _make_room(stack.document, together)
-    for text, tables, given in parsed:
+    for text, tables, given in changes:
         table = stack.document
         for key in tables:
             table = table.setdefault(key, {})
@@ -213,6 +216,8 @@ def _parsed(text: str) -> tuple[str, list[str], Document]:
     if not (path and equals and value):
         raise InputError(f"{SET} {text}: write key=value, for instance robot.parameters.mass=12")
     *tables, last = _keys(path)
+    if len(tables) > DEEPEST:
+        raise InputError(f"{SET} {text}: {TOO_DEEP}")
     return text, tables, named_tables({last: _toml_value(value, text)})
 
 
@@ -233,8 +238,12 @@ def _keys(path: str) -> list[str]:
 def _toml_value(value: str, text: str) -> Any:
     """Return a TOML value; a bare word is taken as a string, so that a shell's quotes can be left out."""
     try:
-        return tomllib.loads(f"v = {value}")["v"]
-    except tomllib.TOMLDecodeError:
+        found = parsed(f"v = {value}")
+    except ValueError as error:
         if re.fullmatch(r"[A-Za-z_./][\w./+-]*", value):
             return value
-        raise InputError(f"{SET} {text}: {value} is not a TOML value; quote a string") from None
+        why = "is not a TOML value; quote a string" if isinstance(error, tomllib.TOMLDecodeError) else str(error)
+        raise InputError(f"{SET} {text}: {value} {why}") from None
+    if len(found) > 1:
+        raise InputError(f"{SET} {text}: give one value, and the next with a {SET} of its own")
+    return found["v"]

@@ -48,7 +48,7 @@ def _scalar(value: Any) -> Scalar:
 Settings = dict[str, Annotated[Any, AfterValidator(_scalar)]]
 Inputs = dict[str, Annotated[Any, AfterValidator(as_input)]]
 Positive = Annotated[float, Field(gt=0.0)]
-Count = Annotated[int, Field(ge=1)]
+Count = Annotated[int, Field(ge=1, le=10**6)]
 NonNegative = Annotated[float, Field(ge=0.0)]
 Temperature = Annotated[float, Field(ge=-100.0, le=300.0)]
 """°C, of a line."""

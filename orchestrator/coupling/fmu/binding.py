@@ -8,7 +8,7 @@ fatal).
 from __future__ import annotations
 
 import ctypes
-from collections.abc import Callable
+from collections.abc import Callable, Sequence
 from ctypes import CFUNCTYPE, byref, c_bool, c_char, c_double, c_int, c_size_t, c_uint, c_void_p
 from functools import partial
 from pathlib import Path
@@ -191,6 +191,11 @@ class Fmi2:
         """Free a saved state."""
         return self._free_state(byref(state))
 
+    def configure(self, values: Sequence[tuple[str, int, int]]) -> int:
+        """Set structural parameters, type, reference and value of each, in configuration mode."""
+        self.sink(ERROR, "structural parameters are those of FMI 3.0")
+        return ERROR
+
     def enter_initialization(self, start: float, stop: float | None) -> int:
         """Set up the experiment and enter initialisation."""
         return self._checked(
@@ -283,6 +288,11 @@ class Fmi3(Fmi2):
     def ends(self) -> bool:
         """Whether the step that has just been made shall be the last."""
         return bool(self.flags[1])
+
+    def configure(self, values: Sequence[tuple[str, int, int]]) -> int:
+        """Set structural parameters, type, reference and value of each, in configuration mode."""
+        sets = [partial(getattr(self.slave, f"set{kind}"), [vr], [value]) for kind, vr, value in values]
+        return self._checked(self.slave.enterConfigurationMode, *sets, self.slave.exitConfigurationMode)
 
     def enter_initialization(self, start: float, stop: float | None) -> int:
         """Enter initialisation."""

@@ -18,6 +18,7 @@ from typing import Any, Self
 import fmpy
 import numpy as np
 
+from orchestrator.coupling.cache import remove
 from orchestrator.coupling.course import Course
 from orchestrator.coupling.errors import FORWARD, digits, nearest
 from orchestrator.coupling.exchange import PARAMETER
@@ -35,16 +36,26 @@ from orchestrator.coupling.fmu.binding import (
     binding_of,
     finalize_python,
 )
-from orchestrator.coupling.fmu.description import Port, Value, capabilities_of, ports_of, read_description
+from orchestrator.coupling.fmu.description import (
+    NO_STRUCTURE,
+    STRUCTURAL,
+    Port,
+    Structure,
+    Value,
+    capabilities_of,
+    ports_of,
+    read_description,
+    structure_of,
+)
 from orchestrator.coupling.fmu.driven import Driven
 from orchestrator.coupling.fmu.failure import CRASHED, NOT_FINITE, FmuEnd, FmuError
 from orchestrator.coupling.fmu.group import Group
 from orchestrator.coupling.fmu.isolated import Isolated, Limits
 from orchestrator.coupling.fmu.messages import Messages, gist
 from orchestrator.coupling.fmu.nursery import POSSIBLE
-from orchestrator.coupling.fmu.python_modules import own_modules
+from orchestrator.coupling.fmu.python_modules import is_python, own_modules
 from orchestrator.coupling.fmu.saved_states import SavedStates
-from orchestrator.coupling.fmu.unzipped import unzip
+from orchestrator.coupling.fmu.unzipped import RESOURCES, own_copy, unzip
 from orchestrator.coupling.fmu.vocabulary import vocabulary_of
 
 logging.getLogger("fmus").addHandler(logging.NullHandler())  # what our FMUs say comes through FMI, like that of others
@@ -63,6 +74,7 @@ class Fmu:
     name : instance name; the model's name if none is given
     continuous : real variables that it declares discrete, and are not
     isolate : whether it lives in a process of its own (docs/reference/fmus.md), and within which limits
+    structure : values of structural parameters (FMI 3.0), on which the lengths of arrays hang
 
     Attributes
     ----------
@@ -88,11 +100,13 @@ class Fmu:
         name: str | None = None,
         continuous: Iterable[str] = (),
         isolate: bool | Limits = False,
+        structure: Structure = NO_STRUCTURE,
     ):
         self.path = Path(path)
         self.description, self.sha256 = read_description(self.path)
         self.name = name or str(self.description.modelName)
-        self.ports = {p.name: p for v in self.description.modelVariables for p in ports_of(v)}
+        self.structure = _known_structure(self, structure)
+        self.ports = {p.name: p for v in self.description.modelVariables for p in ports_of(v, self.structure)}
         self.continuous = tuple(continuous)
         self.ports |= {name: _continuous(self, name) for name in self.continuous}
         self.vocabulary = vocabulary_of(self.description, self.ports)
@@ -107,20 +121,49 @@ class Fmu:
         self.worst, self.initialized = 0, False
         self.abandoned = False
         self.fate: tuple[int, str] | None = None
+        self._own: Path | None = None
         self.limits = isolate if isinstance(isolate, Limits) else Limits() if isolate else None
         if self.limits and not POSSIBLE:
             self.limits = None
             self.log.add(WARNING, "there are no processes for FMUs on this system: it lives in ours")
         _require_possible(self)
         try:
-            self.folder = unzip(self.path, self.sha256)
+            self.folder = self._own_folder(unzip(self.path, self.sha256))
             self.fmi = self._loaded()
         except FmuError:
+            self._remove_own()
             raise
         except Exception as error:
+            self._remove_own()
             hint = f" ({self.log.cause})" if self.log.cause else ""
             raise ValueError(f"{self.path}: the FMU cannot be loaded: {error}{hint}") from error
         _instances.append(self)
+        if self.structure:
+            self._configure()
+
+    def _own_folder(self, unzipped: Path) -> Path:
+        """Return where this instance finds its files: its own copy if it can write them, and no other shares its process.
+
+        FMUs in Python that share ours share their scripts, too: a module of one name is loaded once.
+        """
+        alone = self.limits is not None or not is_python(unzipped)
+        self._own = own_copy(unzipped) if alone and (unzipped / RESOURCES).is_dir() else None
+        return self._own or unzipped
+
+    def _remove_own(self) -> None:
+        """Remove the copy of this instance alone, if there is one."""
+        if self._own is not None:
+            remove(self._own)
+
+    def _configure(self) -> None:
+        """Set the structural parameters; the instance is freed where that fails."""
+        ports = [(self.ports[name], value) for name, value in self.structure.items()]
+        values = [(port.fmi_type, port.vr, value) for port, value in ports]
+        try:
+            self._call("setting structural parameters", self.fmi.configure, values)
+        except BaseException:
+            self.close()
+            raise
 
     def _loaded(self) -> Fmi2 | Isolated:
         """Load the library and make the instance, here or in a process of its own."""
@@ -201,10 +244,22 @@ class Fmu:
         """
         for name, value in values.items():
             port = self.port(name)
-            if port.causality not in ("parameter", "input", "structuralParameter"):
+            if port.causality == STRUCTURAL:
+                self._require_set(name, value)
+                continue
+            if port.causality not in ("parameter", "input"):
                 raise ValueError(f"{self.name}.{name} is no parameter: its causality is {port.causality}")
             self._set_one(port, value)
         self.parameters |= values
+
+    def _require_set(self, name: str, value: Value) -> None:
+        """Raise `ValueError` if a structural parameter has another value than the instance was made with."""
+        known = self.structure.get(name, int(self.ports[name].start or 0))
+        if value != known:
+            raise ValueError(
+                f"{self.name}.{name} is a structural parameter, on which arrays hang: give structure = {{{name!r}: {value}}} "
+                "when the instance is made"
+            )
 
     def follow(self, courses: Mapping[str, Course], taken: Iterable[str] = ()) -> None:
         """Let inputs follow `courses` over time: each step is given their means, and slopes where there are inputs for them.
@@ -230,7 +285,7 @@ class Fmu:
 
     def twin(self) -> Fmu:
         """Return a second instance with the same parameters, not initialised."""
-        twin = Fmu(self.path, self.name, self.continuous, self.limits or False)
+        twin = Fmu(self.path, self.name, self.continuous, self.limits or False, self.structure)
         twin.set_parameters(self.parameters)
         if self.driven is not None:
             twin.follow(self.driven.courses, self.driven.taken)
@@ -379,6 +434,7 @@ class Fmu:
             self.fmi.dismiss()
         else:
             _libraries.append(self.fmi.slave.dll)
+        self._remove_own()
 
     def _bid(self, doing: str, call: Callable[[], int]) -> None:
         """Make one of the last calls; the results are there, so that its failure is said in the log alone."""
@@ -389,6 +445,15 @@ class Fmu:
         else:
             if status > WARNING:
                 self.log.add(ERROR, self.error(status, doing).message)
+
+
+def _known_structure(fmu: Fmu, structure: Structure) -> Structure:
+    """Return values of structural parameters; `ValueError` where one is none, or arrays become too large."""
+    found = structure_of(fmu.description, structure)
+    unknown = next((name for name in structure if name not in found), None)
+    if unknown is not None:
+        raise ValueError(f"{fmu.name}: {unknown} is no structural parameter with a whole number, of {fmu.path.name}")
+    return found
 
 
 def _continuous(fmu: Fmu, name: str) -> Port:

@@ -8,7 +8,7 @@ from __future__ import annotations
 import json
 import os
 import sys
-from collections.abc import Callable
+from collections.abc import Callable, Sequence
 from dataclasses import dataclass
 from functools import partial
 from itertools import count
@@ -274,6 +274,10 @@ class Isolated:
     def asks_for_the_end(self, t: float) -> bool:
         """Return whether a step from `t` that was discarded says that the simulation shall end there."""
         return self._called("asks_for_the_end", t, changes=False) == OK and bool(self._result)
+
+    def configure(self, values: Sequence[tuple[str, int, int]]) -> int:
+        """Set structural parameters, type, reference and value of each, in configuration mode."""
+        return self._called("configure", list(values))
 
     def enter_initialization(self, start: float, stop: float | None) -> int:
         """Set up the experiment and enter initialisation."""

@@ -12,7 +12,7 @@ import numpy as np
 from orchestrator.coupling.errors import digits
 from orchestrator.coupling.exchange import MEAN, RATE, is_from_start, is_load, is_motion, suffixed
 from orchestrator.coupling.fmu.binding import ERROR, SavedState
-from orchestrator.coupling.fmu.description import Port
+from orchestrator.coupling.fmu.description import NO_STRUCTURE, Port, Structure
 from orchestrator.coupling.fmu.failure import FmuError
 from orchestrator.coupling.fmu.group import Group
 from orchestrator.coupling.fmu.instance import Fmu
@@ -22,12 +22,17 @@ WHOLE = 1e-6  # how far a number of steps may be from a whole one
 
 
 def instance(
-    path: str | Path, name: str, steps: int = 1, continuous: Iterable[str] = (), isolate: bool | Limits = False
+    path: str | Path,
+    name: str,
+    steps: int = 1,
+    continuous: Iterable[str] = (),
+    isolate: bool | Limits = False,
+    structure: Structure = NO_STRUCTURE,
 ) -> Fmu:
     """Return an instance of an FMU that makes `steps` steps in each of the master's; the others as for `Fmu`."""
     if steps == 1:
-        return Fmu(path, name, continuous, isolate)
-    return SubStepped(path, name, steps, continuous, isolate)
+        return Fmu(path, name, continuous, isolate, structure)
+    return SubStepped(path, name, steps, continuous, isolate, structure)
 
 
 class SubStepped(Fmu):
@@ -60,8 +65,9 @@ class SubStepped(Fmu):
         steps: int,
         continuous: Iterable[str] = (),
         isolate: bool | Limits = False,
+        structure: Structure = NO_STRUCTURE,
     ):
-        super().__init__(path, name, continuous, isolate)
+        super().__init__(path, name, continuous, isolate, structure)
         if steps < 1:
             raise ValueError(f"{self.name}: steps = {steps}; at least one is made")
         self.steps, self.length, self.stepped = steps, 0.0, False
@@ -118,7 +124,7 @@ class SubStepped(Fmu):
 
     def twin(self) -> Fmu:
         """Return a second instance with the same parameters, not initialised."""
-        twin = SubStepped(self.path, self.name, self.steps, self.continuous, self.limits or False)
+        twin = SubStepped(self.path, self.name, self.steps, self.continuous, self.limits or False, self.structure)
         twin.set_parameters(self.parameters)
         if self.driven is not None:
             twin.follow(self.driven.courses, self.driven.taken)

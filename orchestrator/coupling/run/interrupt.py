@@ -39,8 +39,6 @@ def interruptible() -> Iterator[Callable[[float], None]]:
         if asked:
             raise Interruption(time, asked[0])
 
-    with (
-        listening(asked.append),
-        waiting(check),
-    ):  # an FMU in a process of its own may never come to a communication point
+    # an FMU in a process of its own may never come to a communication point
+    with listening(asked.append), waiting(check):
         yield check

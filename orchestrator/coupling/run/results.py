@@ -18,6 +18,7 @@ from typing import Any
 import numpy as np
 
 from orchestrator.coupling.errors import InputError
+from orchestrator.coupling.reading import require_file
 from orchestrator.coupling.run.columns import Columns, Rows, pieces_of
 from orchestrator.coupling.scratch import scratch
 
@@ -83,7 +84,9 @@ def write_json(path: Path, content: Any) -> None:
     """Write `content` as JSON; NaN and infinity, which JSON has not, become null."""
     text = json.dumps(plain(content), indent=2, ensure_ascii=False, allow_nan=False)
     with replacing(path) as temporary:
-        temporary.write_text(text + "\n", encoding="utf-8")
+        temporary.write_text(
+            text + "\n", encoding="utf-8", errors="backslashreplace"
+        )  # names of files that are no text
 
 
 def write_fields(path: Path, fields: Mapping[str, np.ndarray], units: Mapping[str, str]) -> None:
@@ -110,6 +113,7 @@ def write_bytes(path: Path, content: bytes | memoryview) -> None:
 def read_table(path: Path) -> Table:
     """Return the columns of a CSV table that `RunDirectory.write_table` or FMPy wrote; of a long one, columns on disk."""
     try:
+        require_file(path, "a table of results")
         with open(path, encoding="utf-8", newline="") as file:
             names = next(csv.reader(file))
             if os.fstat(file.fileno()).st_size > IN_MEMORY:
@@ -134,8 +138,9 @@ def _on_disk(names: list[str], lines: Iterable[str]) -> Columns:
 def read_json(path: Path) -> Any:
     """Return the content of a JSON file; raise `InputError` if it cannot be read."""
     try:
+        require_file(path, "a JSON file")
         return json.loads(path.read_text(encoding="utf-8"))
-    except (OSError, ValueError) as error:
+    except (OSError, ValueError, RecursionError) as error:
         raise InputError(f"{path}: cannot be read: {error}") from None
 
 
@@ -145,8 +150,11 @@ def read_fields(path: Path) -> dict[str, np.ndarray]:
         return {}
     import h5py
 
-    with h5py.File(path) as file:
-        return {str(key): np.asarray(file[key]) for key in file}
+    try:
+        with h5py.File(path) as file:
+            return {str(key): np.asarray(file[key]) for key in file}
+    except (OSError, ValueError, KeyError, RuntimeError) as error:
+        raise InputError(f"{path}: cannot be read: {error}") from None
 
 
 def _exact(column: np.ndarray) -> list[str]:

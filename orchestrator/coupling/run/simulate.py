@@ -26,6 +26,7 @@ from orchestrator.coupling.run.steps import NAMES, POWER, add
 from orchestrator.coupling.run.work import Work
 from orchestrator.coupling.stepping.master import Master
 from orchestrator.coupling.stepping.report import StepReport
+from orchestrator.coupling.steps import number_of
 
 SIGNALS, STEPS = "signals.part", "steps.part"
 """Files of a run that is going on."""
@@ -98,7 +99,7 @@ def steps_between(start: float, stop: float, H: float) -> tuple[int, float]:
         raise ValueError(f"macro step {H:g} s: must be positive")
     if not stop > start:
         raise ValueError(f"stop time {digits(stop)} s: must be after the start at {digits(start)} s")
-    n = max(round((stop - start) / H), 1)
+    n = number_of(stop - start, H)
     even, error = (stop - start) / n, abs(n * H - (stop - start)) / (stop - start)
     if error > DIVIDES:
         raise ValueError(f"macro step {digits(H)} s does not divide {digits(stop - start)} s; {digits(even)} s does")
