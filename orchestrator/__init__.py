@@ -24,6 +24,7 @@ if TYPE_CHECKING:
         load_comparison,
         load_run,
         load_scenario,
+        load_unfinished,
         run,
         sweep,
     )
@@ -38,6 +39,7 @@ __all__ = [
     "load_comparison",
     "load_run",
     "load_scenario",
+    "load_unfinished",
     "run",
     "sweep",
 ]

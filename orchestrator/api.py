@@ -10,6 +10,7 @@ The command line is a thin layer over it. Everything here can be had from `orche
 
 from __future__ import annotations
 
+import signal
 import warnings
 from collections.abc import Callable, Iterator, Mapping, Sequence
 from contextlib import contextmanager
@@ -22,8 +23,10 @@ from fmus.kernels.jit import COMPILATION
 from orchestrator.catalogue.documents import read_once
 from orchestrator.coupling.errors import InputError, RunError, nearest
 from orchestrator.coupling.masters import MASTERS
+from orchestrator.coupling.scratch import remove_left_overs
+from orchestrator.coupling.signals import deferred, passed_on
 from orchestrator.runs.compare import Comparison, compared
-from orchestrator.runs.coupled import run_coupled
+from orchestrator.runs.coupled import Interrupted, run_coupled
 from orchestrator.runs.directory import RunDirectory, claimed
 from orchestrator.runs.estimate import estimate_error
 from orchestrator.runs.files import (
@@ -35,9 +38,11 @@ from orchestrator.runs.files import (
     write_run,
     write_unfinished,
 )
+from orchestrator.runs.recovered import write_recovered
 from orchestrator.runs.result import Run, Signal, run_label
 from orchestrator.runs.summary import result
 from orchestrator.runs.systems import System, resolve
+from orchestrator.runs.unfinished import is_unfinished, load_unfinished
 from orchestrator.runs.whatif import leave
 from orchestrator.scenario.layers import shared_options
 from orchestrator.scenario.read import load
@@ -57,6 +62,7 @@ __all__ = [
     "load_comparison",
     "load_run",
     "load_scenario",
+    "load_unfinished",
     "run",
     "sweep",
 ]
@@ -71,7 +77,7 @@ class Unfinished(RunError):
 
     def __init__(self, error: RunError, runs: Sequence[Run], directory: Path):
         super().__init__(str(error), error.time)
-        self.runs, self.directory = list(runs), directory
+        self.runs, self.directory, self.exit_status = list(runs), directory, error.exit_status
 
 
 def run(
@@ -108,7 +114,8 @@ def run(
     -------
     Run
         signals, summary, verdict. A run that fails on its way does not raise: its `verdict` is then ``failed`` (after
-        Ctrl-C ``interrupted``), its `error` says why, and its signals end where it did.
+        Ctrl-C ``interrupted``), its `error` says why, and its signals end where it did. SIGTERM and SIGHUP end it so, too;
+        once its results are written they go on to who handles them, or end the process.
 
     Raises
     ------
@@ -119,11 +126,13 @@ def run(
         loaded = Changes(set, robot, master, macro_step, stop, timeout, estimate).of(scenario)
         with _directory(out, loaded.name) as directory:
             system = _ready(loaded)
-            found = _run(system, progress or _silent)
-            if directory is None:
-                return found
-            leave(directory, system, others=pictures)
-            return write_run(directory, found, _views(pictures))
+            found = _run(system, progress or _silent, directory and directory.path)
+            if directory is not None:
+                with deferred(f"results so far in {directory.path}"):
+                    leave(directory, system, others=pictures)
+                    found = write_run(directory, found, _views(pictures))
+            _end(found.summary["signal"], found.directory)
+            return found
 
 
 def compare(
@@ -169,8 +178,9 @@ def compare(
             found = _compared(system, variants, progress or _silent, directory, views)
             if directory is None:
                 return found
-            leave(directory, system, others=pictures)
-            return write_comparison(directory, found, views)
+            with deferred(f"results in {directory.path}"):
+                leave(directory, system, others=pictures)
+                return write_comparison(directory, found, views)
 
 
 def sweep(
@@ -202,6 +212,23 @@ def sweep(
     from orchestrator.studies.sweep.result import run as run_all  # with what only studies need
 
     return run_all(study, out, workers, timeout, progress or (lambda done, of, failed: None), dask)
+
+
+def report_of(directory: Path) -> Path:
+    """Draw the pictures of a run or comparison anew, and return its page; of a sweep, the page alone.
+
+    Of a run that has left no manifest all there is becomes files like those of one that has failed, with page and pictures;
+    if it still goes on, in a folder of their own.
+
+    Raises
+    ------
+    InputError : there are no results, or they are damaged
+    """
+    from orchestrator.report import page
+
+    if is_unfinished(directory):
+        return write_recovered(RunDirectory.of(directory), _views(True)) / page.NAME
+    return page.report(directory)
 
 
 def load_scenario(
@@ -261,6 +288,7 @@ class Changes:
 
 def _ready(scenario: Scenario) -> System:
     """Return the scenario resolved; a landing's kernels are compiled before, which takes half the time side by side."""
+    remove_left_overs()
     if isinstance(scenario, LandingScenario):
         compile_modules()
     return resolve(scenario)
@@ -288,21 +316,41 @@ def _compared(
     steps = sorted({variant.simulation.macro_step for variant in variants})
     try:
         for variant in variants:
-            runs.append(_run(system.changed(variant.master, **dict(variant.simulation)), progress, estimate=False))
-        reference = solve_reference(system, steps, _told(progress, "reference", system.scenario))
+            changed = system.changed(variant.master, **dict(variant.simulation))
+            runs.append(_run(changed, progress, _place(directory, variant), estimate=False))
+            if runs[-1].verdict == "interrupted":
+                raise Interrupted(runs[-1].error or "", runs[-1].time[-1], runs[-1].summary["signal"])
+        told = _told(progress, "reference", system.scenario)
+        reference = solve_reference(system, steps, told)
         COMPILATION.conclude()
     except RunError as error:
         if runs and directory is not None:
-            write_unfinished(directory, runs, str(error), views)
+            with deferred(f"results so far in {directory.path}"):
+                write_unfinished(directory, runs, str(error), views)
+            _end(getattr(error, "number", None), directory.path)
             raise Unfinished(error, runs, directory.path) from None
+        _end(getattr(error, "number", None), None)
         raise
     return compared(runs, reference)
 
 
-def _run(system: System, progress: Progress, estimate: bool = True) -> Run:
+def _end(number: int | None, directory: Path | None) -> None:
+    """Pass on a signal that asks this process to end, now that results are in `directory`; Ctrl-C has had its effect."""
+    if number != signal.SIGINT:
+        passed_on(number, f"results so far in {directory}" if directory is not None else "")
+
+
+def _place(directory: RunDirectory | None, variant: Scenario) -> Path | None:
+    """Return the folder of a run of a comparison."""
+    if directory is None:
+        return None
+    return directory.path / run_label(variant.simulation.master, variant.simulation.macro_step)
+
+
+def _run(system: System, progress: Progress, directory: Path | None, estimate: bool = True) -> Run:
     simulation = system.scenario.simulation
     label = run_label(simulation.master, simulation.macro_step)
-    coupled = run_coupled(system, _told(progress, label, system.scenario))
+    coupled = run_coupled(system, _told(progress, label, system.scenario), directory)
     if estimate:
         estimate_error(coupled, lambda part: _told(progress, f"error estimate: {part}", system.scenario))
     COMPILATION.conclude()
@@ -328,8 +376,16 @@ def _directory(out: Out, name: str) -> Iterator[RunDirectory | None]:
 
 
 def _views(pictures: bool) -> Views:
-    if not pictures:
-        return NO_VIEWS
-    from orchestrator.report import drawing, page
+    return Views(_pictures, _page) if pictures else NO_VIEWS
 
-    return Views(drawing.draw, page.write)
+
+def _pictures(directory: Path) -> None:
+    from orchestrator.report import drawing  # a library for pictures that cannot be loaded costs the pictures alone
+
+    drawing.draw(directory)
+
+
+def _page(directory: Path, manifest: Mapping[str, Any]) -> None:
+    from orchestrator.report import page
+
+    page.write(directory, manifest)

@@ -19,9 +19,11 @@ macro_step = 0.01
 master = "jacobi"
 [components.p]
 fmu = "{fmu}"
+isolate = false
 parameters.start = 1.0
 [components.q]
 fmu = "{fmu}"
+isolate = false
 parameters.gain = -1.0
 """
 STUDY = """

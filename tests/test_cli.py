@@ -217,7 +217,7 @@ from orchestrator.cli import commands
 from orchestrator.runs import coupled
 run = coupled.run_coupled
 press = lambda time: time > 0.5 and os.kill(os.getpid(), signal.SIGINT)
-coupled.run_coupled = lambda scenario, progress: run(scenario, press)
+coupled.run_coupled = lambda scenario, progress, *rest: run(scenario, press, *rest)
 commands.main(sys.argv[1:])
 """
 

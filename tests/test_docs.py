@@ -27,6 +27,7 @@ BY_COMMAND = {
     DOCS / "verification.md",
     DOCS / "reproduction.md",
     DOCS / "robots_on_lines.md",
+    DOCS / "setting_down.md",
     *DOCS.glob("reference/generated/*.md"),
     *DOCS.glob("_build/**/*.md"),
 }
@@ -115,6 +116,7 @@ def test_the_reference_names_every_command_and_option(from_code: Any) -> None:
         "build",
         "check",
         "compare",
+        "export",
         "identify",
         "limits",
         "list",
@@ -146,8 +148,20 @@ def test_measured_numbers_are_those_of_the_file() -> None:
         assert measured["filled"](text, found) == text, f"{page}: python docs/measured.py --fill"
 
 
+def test_the_table_of_engines_is_that_of_its_file() -> None:
+    made = runpy.run_path(str(DOCS / "engines.py"))
+    text = made["PAGE"].read_text(encoding="utf-8")
+    assert made["filled"](text, json.loads(made["FILE"].read_text(encoding="utf-8"))) == text, "docs/engines.py --fill"
+
+
 def test_the_page_of_robots_on_lines_is_that_of_its_file() -> None:
     made = runpy.run_path(str(DOCS / "robots_on_lines.py"))
     found = json.loads(made["FILE"].read_text(encoding="utf-8"))
     assert made["page"](found) == made["PAGE"].read_text(encoding="utf-8"), "python docs/robots_on_lines.py --fill"
+
+
+def test_the_page_of_setting_down_is_that_of_its_file() -> None:
+    made = runpy.run_path(str(DOCS / "setting_down.py"))
+    found = json.loads(made["FILE"].read_text(encoding="utf-8"))
+    assert made["page"](found) == made["PAGE"].read_text(encoding="utf-8"), "python docs/setting_down.py --fill"
     assert made["PICTURE"].exists()

@@ -11,6 +11,7 @@ from concurrent.futures import ThreadPoolExecutor
 from pathlib import Path
 from stat import S_IMODE
 from threading import Barrier
+from time import time
 
 import fmpy
 import numba
@@ -21,7 +22,8 @@ from numba.core import caching
 from fmus.kernels.cache import user_folder as folder_of_modules
 from orchestrator.coupling import cache, kernel
 from orchestrator.coupling.cache import user_folder
-from orchestrator.coupling.fmu.unzipped import unzip
+from orchestrator.coupling.fmu import unzipped
+from orchestrator.coupling.fmu.unzipped import own_copy, unzip
 from tests.fmus import build
 
 
@@ -109,8 +111,8 @@ def test_a_home_with_letters_that_loaders_cannot_read(tmp_path: Path) -> None:
     assert done.stderr.count("line-landing: FMUs cannot be loaded from") == 1
     base = temporary / f"line-landing-{os.getuid()}"
     assert S_IMODE(base.stat().st_mode) == 0o700
-    assert len(list((base / "unzipped").iterdir())) == 1
-    assert str(base).isascii() and not list(home.rglob("unzipped"))
+    assert len(list((base / "unpacked").iterdir())) == 1
+    assert str(base).isascii() and not list(home.rglob("unpacked"))
 
 
 # -- what is in there -------------------------------------------------------------------------------------------
@@ -118,8 +120,8 @@ def test_a_home_with_letters_that_loaders_cannot_read(tmp_path: Path) -> None:
 
 def test_unzipped_once(own: Path, monkeypatch: pytest.MonkeyPatch) -> None:
     first = unzip(build("odd"), "abc")
-    monkeypatch.setattr(fmpy, "extract", lambda *_: pytest.fail("unzipped again"))
-    assert unzip(build("odd"), "abc") == first == own / "unzipped" / "abc"
+    monkeypatch.setattr(unzipped, "unpack", lambda *_: pytest.fail("unzipped again"))
+    assert unzip(build("odd"), "abc") == first == own / "unpacked" / "abc"
 
 
 def test_what_has_lost_a_file_is_unzipped_anew(own: Path) -> None:
@@ -141,8 +143,8 @@ def test_a_link_is_not_followed(whole: bool, own: Path, tmp_path: Path) -> None:
     elsewhere.mkdir()
     if whole:
         fmpy.extract(str(path), str(elsewhere))
-    (own / "unzipped").mkdir(parents=True)
-    (own / "unzipped" / "abc").symlink_to(elsewhere)
+    (own / "unpacked").mkdir(parents=True)
+    (own / "unpacked" / "abc").symlink_to(elsewhere)
     before = files(elsewhere)
     folder = unzip(path, "abc")
     assert not folder.is_symlink() and (folder / "modelDescription.xml").is_file()
@@ -150,13 +152,13 @@ def test_a_link_is_not_followed(whole: bool, own: Path, tmp_path: Path) -> None:
 
 
 def test_several_at_once_see_it_whole_and_leave_nothing_else(own: Path, monkeypatch: pytest.MonkeyPatch) -> None:
-    path, extract, barrier = build("odd"), fmpy.extract, Barrier(4)
+    path, unpack, barrier = build("odd"), unzipped.unpack, Barrier(4)
 
-    def together(*arguments: str) -> str:
+    def together(*arguments: Path) -> dict[str, str]:
         barrier.wait(10.0)  # all find nothing there, and all unzip
-        return extract(*arguments)
+        return unpack(*arguments)
 
-    monkeypatch.setattr(fmpy, "extract", together)
+    monkeypatch.setattr(unzipped, "unpack", together)
     with ThreadPoolExecutor(4) as pool:
         folders = list(pool.map(lambda _: unzip(path, "abc"), range(4)))
     assert len(set(folders)) == 1
@@ -164,15 +166,84 @@ def test_several_at_once_see_it_whole_and_leave_nothing_else(own: Path, monkeypa
 
 
 def test_a_damaged_archive_leaves_nothing(own: Path, monkeypatch: pytest.MonkeyPatch) -> None:
-    def half(path: str, folder: str) -> None:
-        os.mkdir(folder)
-        Path(folder, "modelDescription.xml").write_text("")
+    def half(path: Path, folder: Path) -> None:
+        folder.mkdir()
+        (folder / "modelDescription.xml").write_text("")
         raise OSError("disk full")
 
-    monkeypatch.setattr(fmpy, "extract", half)
+    monkeypatch.setattr(unzipped, "unpack", half)
     with pytest.raises(OSError, match="disk full"):
         unzip(build("odd"), "abc")
-    assert not list((own / "unzipped").iterdir())
+    assert not list((own / "unpacked").iterdir()) and not (own / "unpacked-hashes").exists()
+
+
+# -- what is not trusted ----------------------------------------------------------------------------------------
+
+
+def test_what_was_changed_is_unzipped_anew(own: Path) -> None:
+    """By an FMU or whoever else, its size and date as they were; a file more, or a link in the place of one."""
+    path = build("odd")
+    folder = unzip(path, "abc")
+    description, before = folder / "modelDescription.xml", files(folder)
+    content, when = description.read_bytes(), description.stat().st_mtime
+    description.write_bytes(content.replace(b"x", b"y"))
+    os.utime(description, (when, when))
+    assert (unzip(path, "abc") / "modelDescription.xml").read_bytes() == content
+    (folder / "resources" / "state.txt").write_text("left by a run")
+    assert files(unzip(path, "abc")) == before
+    description.unlink()
+    description.symlink_to("/etc/passwd")
+    assert (unzip(path, "abc") / "modelDescription.xml").read_bytes() == content
+    (own / "unpacked-hashes" / "abc.json").write_text("{")
+    assert files(unzip(path, "abc")) == before
+
+
+def test_what_python_compiles_is_no_change(own: Path, monkeypatch: pytest.MonkeyPatch) -> None:
+    folder = unzip(build("odd"), "abc")
+    (folder / "resources" / "__pycache__").mkdir()
+    (folder / "resources" / "__pycache__" / "odd.pyc").write_text("")
+    monkeypatch.setattr(unzipped, "unpack", lambda *_: pytest.fail("unzipped again"))
+    assert unzip(build("odd"), "abc") == folder
+
+
+def test_an_instance_has_resources_of_its_own_and_shares_its_library(own: Path) -> None:
+    """What one writes, no other sees; one library, so that the system loads it once."""
+    folder = unzip(build("odd"), "abc")
+    one, two = own_copy(folder), own_copy(folder)
+    assert files(one) == files(two) == files(folder)
+    script = next((one / "resources").glob("*.py")).relative_to(one)
+    with (one / script).open("a") as file:
+        file.write("# left by a run")
+    assert (two / script).read_bytes() == (folder / script).read_bytes() != (one / script).read_bytes()
+    library = next((one / "binaries").rglob("*.so")).relative_to(one)
+    assert (one / library).samefile(folder / library)
+
+
+def test_copies_of_processes_that_are_no_more_are_removed(own: Path) -> None:
+    folder = unzip(build("odd"), "abc")
+    code = (
+        "import os; from pathlib import Path; from orchestrator.coupling.fmu.unzipped import own_copy\n"
+        f"print(own_copy(Path({str(folder)!r})), flush=True); os.kill(os.getpid(), 9)"
+    )
+    lost = Path(subprocess.run([sys.executable, "-c", code], capture_output=True, text=True).stdout.strip())
+    assert (lost / "modelDescription.xml").is_file()
+    mine = own_copy(folder)
+    assert [entry for entry in mine.parent.iterdir()] == [mine]
+
+
+def test_the_oldest_are_removed_where_there_is_too_little_room(own: Path, monkeypatch: pytest.MonkeyPatch) -> None:
+    """Five of 1 MB in 3.5 MB, the last used today: two go, by age; what was used today stays even beyond the limit."""
+    folder = user_folder("unpacked")
+    for i in range(5):
+        (folder / f"{i}" / "resources").mkdir(parents=True)
+        (folder / f"{i}" / "resources" / "data").write_bytes(bytes(10**6))
+        age = 0 if i == 4 else 86400 * (10 - i)
+        os.utime(folder / f"{i}", (time() - age, time() - age))
+    cache.shrink(folder, 3.5)
+    assert sorted(entry.name for entry in folder.iterdir()) == ["2", "3", "4"]
+    monkeypatch.setenv("LINE_LANDING_CACHE_MB", "0.5")
+    cache.shrink(folder, 3.5)
+    assert [entry.name for entry in folder.iterdir()] == ["4"]
 
 
 # -- compiled kernels -------------------------------------------------------------------------------------------

@@ -5,11 +5,6 @@ Held against other engines, a loop over FMPy alone, closed forms, and the landin
 
 from __future__ import annotations
 
-import json
-import subprocess
-import sys
-from importlib.util import find_spec
-
 import fmpy
 import numpy as np
 import pytest
@@ -27,16 +22,15 @@ from orchestrator.landing import monolithic
 from orchestrator.runs.components import opened
 from orchestrator.runs.result import CHATTER, HELD, SLOW, Run
 from orchestrator.runs.systems import resolve
-from tests.engines import ENGINES
+from tests.engines import ENGINES, by_engine
 from tests.fmi import Instance
 from tests.fmus import build, compiled, described, fmu, needs_compiler
-from tests.scenarios import LANDING, ROOT, scenario
+from tests.scenarios import LANDING, scenario
 from tests.systems import closing
 
 H, N = 0.01, 50
 ROUND_OFF = 1e-15 * N
 """Of N sums of numbers near one, whose order of operations is another."""
-PACKAGES = {"cosim": "libcosimpy", "ecos": "ecospy"}
 
 
 def turning(master: str) -> np.ndarray:
@@ -52,14 +46,7 @@ def turning(master: str) -> np.ndarray:
 @pytest.mark.parametrize("engine", list(ENGINES))
 def test_jacobi_is_that_of_other_engines(engine):
     """All step, then all outputs move: the same where no output depends on an input without a step."""
-    if find_spec(PACKAGES[engine]) is None:
-        pytest.skip(f"{PACKAGES[engine]} is not installed: pip install -e '.[engines]'")
-    command = [sys.executable, "-m", "tests.engines", engine, str(compiled("lag2")), str(H), str(N)]
-    done = subprocess.run(command, cwd=ROOT, capture_output=True, text=True, timeout=120)
-    if "cannot open shared object" in done.stderr:
-        pytest.skip(f"{engine} does not run here: {done.stderr.splitlines()[-1]}")
-    assert done.returncode == 0, done.stderr
-    theirs = np.array(json.loads(done.stdout.splitlines()[-1]))
+    theirs = by_engine(engine, compiled("lag2"), H, N)
     np.testing.assert_allclose(turning("jacobi"), theirs, rtol=0.0, atol=ROUND_OFF)
 
 

@@ -157,15 +157,15 @@ def test_a_link_that_anybody_can_have_put_there_is_no_folder_of_the_users(tmp_pa
 
 def test_unzipped_fmus_that_nobody_uses_are_removed(tmp_path, monkeypatch):
     monkeypatch.setenv("LINE_LANDING_CACHE", str(tmp_path))
-    for kind in ("fmu", "unzipped"):
+    for kind in ("fmu", "unzipped", "unpacked"):
         old, new = tmp_path / kind / "old", tmp_path / kind / "new"
         (old / "resources").mkdir(parents=True)
         new.mkdir()
         os.utime(old, (0, 0))
     path = build("odd")
     folder = unzip(path, "0123")
-    assert (folder / "modelDescription.xml").is_file() and folder.parent == tmp_path / "unzipped"
-    assert sorted(place.name for place in tmp_path.glob("*/*")) == ["0123", "new", "new"]
+    assert (folder / "modelDescription.xml").is_file() and folder.parent == tmp_path / "unpacked"
+    assert sorted(place.name for place in tmp_path.glob("*/*")) == ["0123", "0123.json", "new", "new", "new"]
 
 
 def test_messages_are_collected_with_their_percent_signs():

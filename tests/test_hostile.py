@@ -84,6 +84,50 @@ def test_a_fault_ends_with_status_3_and_what_there_is(loop, orchestrate, tmp_pat
         assert json.loads((out / "manifest.json").read_text())["complete"] is False
 
 
+APART = [  # call and fault of tests/fmus/hostile2.c, status, rows of results
+    (
+        "load crash",
+        3,
+        AT_ONCE,
+        "q, t = 0 s: loading it: its process was ended by SIGSEGV; its last words: [printed] about to crash",
+    ),
+    ("instantiate exit", 3, AT_ONCE, "q, t = 0 s: loading it: its process ended with exit code 0"),
+    ("exit hang", 3, AT_ONCE, "q, t = 0 s: end of initialisation: no answer within 2 s; raise the time-out?"),
+    ("step exit 0.045", 3, LATER, "q, t = 0.05 s: the step of 0.01 s: its process ended with exit code 0"),
+    ("get hang 0.045", 3, 5, "reading y: no answer within 2 s; raise the time-out?"),
+    ("free crash", 0, 11, "q: the FMU has warned 1 times"),
+]
+
+
+@needs_compiler
+@pytest.mark.parametrize(("hostile", "wanted", "rows", "message"), APART, ids=[a[0] for a in APART])
+def test_what_ends_its_process_is_said_and_costs_no_result(
+    loop, orchestrate, tmp_path, monkeypatch, hostile, wanted, rows, message
+):
+    monkeypatch.setenv("HOSTILE", hostile)
+    text = loop.read_text(encoding="utf-8").replace("parameters.gain = -1.0", "").split("[components.q]")
+    loop.write_text(f'{text[0]}[components.q]\nfmu = "{compiled("hostile2")}"\n', encoding="utf-8")
+    out = tmp_path / "out"
+    status, said = orchestrate(
+        "run", loop, "--master", "jacobi", "--out", out, "--quiet", "--timeout", 2, "--no-pictures"
+    )
+    assert status == wanted and message in said
+    assert out.exists() == (rows is not None)
+    if rows is not None:
+        assert len(read_table(out / "results.csv")["time"]) == rows
+        content = json.loads((out / "manifest.json").read_text())
+        assert content["complete"] is (wanted == 0) and content["fmus"]["q"]["isolated"] is True
+        assert wanted or "freeing it: its process was ended by SIGSEGV" in (out / "fmu.log").read_text()
+
+
+@needs_compiler
+def test_validate_says_who_has_a_process_of_its_own(loop, capsys):
+    for options, said in (([], "in processes of their own: p, q"), (["--set", "components.p.isolate=false"], "own: q")):
+        with pytest.raises(SystemExit):
+            cli.main(["validate", str(loop), *options])
+        assert said in capsys.readouterr().out
+
+
 def packed(path: Path, *changes: tuple[str, str], binary: bool = True) -> Path:
     """Write the test FMU ``lag2`` to `path` with parts of its description replaced."""
     with zipfile.ZipFile(compiled("lag2")) as old, zipfile.ZipFile(path, "w") as new:
@@ -102,7 +146,7 @@ FILES = [
     ({"binary": False}, "has no binary for"),
     ({"changes": [('fmiVersion="2.0"', 'fmiVersion="1.0"')]}, "not an FMU"),
     ({"changes": [("CoSimulation", "ModelExchange")]}, "export it for co-simulation"),
-    ({"changes": [ONCE]}, "can be instantiated only once per process"),
+    ({"changes": [ONCE], "more": "isolate = false"}, "can be instantiated only once per process"),
     ({"changes": [("<ModelVariables>", "<ModelVariables")]}, "modelDescription.xml cannot be read"),
     ({"changes": [('"canGetAndSetFMUstate="true"', ""), ('canGetAndSetFMUstate="true"', "")]}, "cannot save its state"),
 ]
@@ -112,9 +156,20 @@ FILES = [
 @pytest.mark.parametrize(("how", "message"), FILES, ids=[message for _, message in FILES])
 def test_an_fmu_that_cannot_be_used_is_refused_by_name(loop, orchestrate, tmp_path, how, message):
     path = packed(tmp_path / "a + b #1 ü.fmu", *how.get("changes", []), binary=how.get("binary", True))
-    loop.write_text(LOOP.format(path.name), encoding="utf-8")
+    more = how.get("more", "")
+    loop.write_text(
+        LOOP.format(path.name).replace("[components.q]", f"{more}\n[components.q]\n{more}"), encoding="utf-8"
+    )
     status, said = orchestrate("validate", loop)
     assert status == 2 and message in said
+
+
+@needs_compiler
+def test_an_fmu_for_once_per_process_runs_twice_in_two(loop, orchestrate, tmp_path):
+    packed(tmp_path / "once.fmu", ONCE)
+    loop.write_text(LOOP.format("once.fmu"), encoding="utf-8")
+    assert orchestrate("run", loop, "--out", tmp_path / "out", "--quiet", "--no-pictures")[0] == 0
+    assert json.loads((tmp_path / "out" / "manifest.json").read_text())["complete"] is True
 
 
 @needs_compiler

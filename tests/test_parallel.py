@@ -24,9 +24,9 @@ NAMES = ("p", "q", "r")
 PARALLEL = [name for name in MASTERS if name != "reduced_interface"]
 
 
-def lags(*, ring: bool = True, **parameters: dict) -> Graph:
+def lags(*, ring: bool = True, isolate: bool = False, **parameters: dict) -> Graph:
     """Three integrators: in a ring p → q → r → p, or (all independent in a round) without connections to each other."""
-    parts = {name: Fmu(compiled("lag2"), name) for name in NAMES}
+    parts = {name: Fmu(compiled("lag2"), name, isolate=isolate) for name in NAMES}
     for k, (name, part) in enumerate(parts.items()):
         part.set_parameters({"start": 1.0 + k, "gain": -1.0, **parameters.get(name, {})})
     pairs = [("p.y", "q.u"), ("q.y", "r.u"), ("r.y", "p.u")] if ring else [(f"{n}.y", f"{n}.u") for n in NAMES]
@@ -127,6 +127,43 @@ def test_time_out_names_the_one_that_hangs():
         assert part.abandoned
         part.abandoned = False
     graph.close()
+
+
+# -- in processes of their own ----------------------------------------------------------------------------------
+
+
+@pytest.mark.parametrize("parallel", ["auto", "always"])
+def test_what_has_a_process_of_its_own_steps_while_others_do(parallel: str):
+    """Three steps that sleep for 20 ms take 60 ms one by one; no thread is needed, and one processor is enough."""
+    long = {name: {"duration": 20e-3} for name in NAMES}
+    walls = {}
+    for way in (parallel, "never"):
+        before, stamps = threading.active_count(), []
+        with lags(isolate=True, **long) as graph:
+            master = MASTERS["jacobi"](graph, parallel=way)  # type: ignore[call-arg]
+            log = simulate(graph, master, 0.0, 0.1, 0.01, on_step=lambda _, s=stamps: s.append(perf_counter()))
+            assert threading.active_count() == before
+        assert log.error is None and np.array_equal(log.values, run("jacobi", lags(), "never", 10)[0].values)
+        walls[way] = np.median(np.diff(stamps))
+    assert walls[parallel] < 0.7 * walls["never"]
+
+
+@pytest.mark.parametrize("failing", [("q",), ("q", "r"), ("r", "p")])
+@pytest.mark.parametrize("master", ["jacobi", "gauss_seidel", "iqn_ils"])
+def test_errors_beside_each_other_are_those_of_serial_stepping(master: str, failing: tuple[str, ...]):
+    faults = {name: {"fault": 3.0, "fault_time": 0.045} for name in failing}
+    serial = run(master, lags(ring=False, **faults), "never")[0]
+    beside = run(master, lags(ring=False, isolate=True, **faults), "auto")[0]
+    assert str(beside.error) == str(serial.error) and len(beside.time) == 6
+    assert np.array_equal(serial.values, beside.values)
+
+
+@pytest.mark.parametrize("failing", ["q", "r"])
+def test_a_process_that_ends_beside_others_costs_no_result(failing: str):
+    """The others have stepped by then; what is recorded ends where all have come to."""
+    log = run("jacobi", lags(isolate=True, **{failing: {"fault": 20.0, "fault_time": 0.045}}), "auto")[0]
+    assert log.error is not None and log.error.component == failing and "SIGSEGV" in log.error.message
+    assert np.array_equal(log.values, run("jacobi", lags(), "never")[0].values[:6])
 
 
 def test_choices():

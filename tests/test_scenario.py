@@ -108,7 +108,7 @@ def test_another_robot_and_another_master(file: Path):
         ("cable.sag=5.0", "cable.sag: unknown key; how the line is strung stands in [cable.state] as sag"),
         (
             "cable.model=x",
-            "cable.model: unknown key; known here: fmu, conductor, stiffness_set, steps, state, parameters",
+            "cable.model: unknown key; known here: fmu, isolate, conductor, stiffness_set, steps, state, parameters",
         ),
         ("cable.parameters.span=true", "cable.parameters.span: True is not of type real"),
         ("cable.parameters.n_elements=2.5", "cable.parameters.n_elements: 2.5 is not of type integer"),

@@ -323,13 +323,14 @@ ONCE = ('canBeInstantiatedOnlyOncePerProcess="false"', 'canBeInstantiatedOnlyOnc
 
 @pytest.mark.usefixtures("alone")
 def test_what_is_advised_for_an_fmu_of_one_instance_works(tmp_path):
-    """A copy of the file is refused; the model exported under another name is not."""
+    """A copy of the file is refused; the model exported under another name is not, nor one in a process of its own."""
     once = described(built(tmp_path / "one", 1.0), tmp_path, ONCE)
     copy = tmp_path / "copy.fmu"
     copy.write_bytes(once.read_bytes())
     with Fmu(once):
         with pytest.raises(ValueError, match="export the model once more under another name"):
             Fmu(copy)
+        Fmu(copy, isolate=True).close()
         other = built(tmp_path / "two", 1.0, name="Other", script="other_of_one_name")
         (tmp_path / "described").mkdir()
         Fmu(described(other, tmp_path / "described", ONCE)).close()

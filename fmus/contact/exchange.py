@@ -9,7 +9,7 @@ import math
 
 from fmus.contact import path as columns
 from fmus.contact import places as at
-from fmus.contact.law import LEFT, OK, SLIP, STEEP, friction, walls
+from fmus.contact.law import LEFT, OK, SLIP, STEEP, foot, friction, walls
 from fmus.contact.path import hermite_path, motion_at, path_work, rotation_given, straight_path, waveform_path
 from fmus.contact.sampling import (
     passed_axle,
@@ -94,6 +94,10 @@ def refresh(prm, inputs, state, motions, samples, outputs):
     The bristle is led on from the last communication point to the inputs.
     """
     row, end, slip = samples[0], inputs[: at.MOTION_SIZE], samples[1, 0:2]
+    if what_is_sent(prm, inputs, state[at.SENT]) != at.MOTION:
+        _write_open(row, outputs)
+        write_memory(state, outputs)
+        return OK
     status = walls(prm, end, row)
     if status != OK and not (status == STEEP and state[at.GONE] != 0.0):
         return status
@@ -116,6 +120,9 @@ def _slip_since(inputs, state, start, rotation, slip):
     Inputs that have not changed since then have not moved: neither does the new cable point count nor the wheel's
     rotation over the step that is past.
     """
+    slip[0] = slip[1] = 0.0
+    if state[at.SENT] != at.MOTION:
+        return
     start_motion(state, start)
     if _same(inputs, state, 0, at.WHEEL):
         for i in range(at.WHEEL):
@@ -137,7 +144,7 @@ def step(prm, method, inputs, t, h, nodes, weights, increments, state, path, mot
     ----------
     prm : (18,); method : 0 point, 1 waveform, 2 hermite; inputs : (45,); t, h : s
     nodes, weights, increments : of `gauss_rule(m)`
-    state : (43,), advanced; outputs : (42,), written
+    state : (44,), advanced; outputs : (42,), written
     path, motions, samples, grid : (2, 4, 15), (m + 3, 24), (m + 2, 34), (m + 5, 4) work space
     way : (1,) m, receives how far wheel and cable move relative to each other in the step
 
@@ -145,6 +152,9 @@ def step(prm, method, inputs, t, h, nodes, weights, increments, state, path, mot
     -------
     int, status of the law
     """
+    sent = what_is_sent(prm, inputs, state[at.SENT])
+    if sent != at.MOTION or state[at.SENT] != at.MOTION:
+        return _first_step(prm, inputs, t, h, sent, state, samples[0], outputs)
     if state[at.GONE] != 0.0:
         return _fallen_step(prm, inputs, h, state, samples[0], outputs)
     m = len(nodes)
@@ -186,6 +196,60 @@ def step(prm, method, inputs, t, h, nodes, weights, increments, state, path, mot
     state[at.WORK_WHEEL] += work_wheel
     _remember(state, inputs, last, h)
     write_instant(last, outputs)
+    write_memory(state, outputs)
+    return OK
+
+
+@kernel
+def what_is_sent(prm, inputs, before):
+    """Tell whether the inputs are a motion of cable and wheel: `MOTION`, `NOTHING` or `FAR`; `before` is what was.
+
+    Many engines send zeros until each FMU has made a step: then a tangent or an axle has no length. The cable, told by then
+    that it is touched at zero, first shows its end; that the contact point is so far off counts when it is so twice.
+    """
+    if _is_zero(inputs, at.TANGENT) or _is_zero(inputs, at.AXLE):
+        return at.NOTHING
+    _length, _u, offset, _d = foot(inputs)
+    if before == at.NOTHING and abs(offset) > max(prm[at.MAX_LENGTH], prm[at.WHEEL_RADIUS]):
+        return at.FAR
+    return at.MOTION
+
+
+@kernel
+def _is_zero(inputs, first):
+    """Tell whether three inputs from `first` on are zero."""
+    return inputs[first] == 0.0 and inputs[first + 1] == 0.0 and inputs[first + 2] == 0.0
+
+
+@kernel
+def _write_open(row, outputs):
+    """Write what a contact shows that is sent no motion: no force, open."""
+    for i in range(at.OUT_SIZE):
+        row[i] = 0.0
+    _write_point(row, outputs)
+    write_instant(row, outputs)
+
+
+@kernel
+def _first_step(prm, inputs, t, h, sent, state, row, outputs):
+    """Make a step of which the start or the end is no motion: the law at its end, as at the start of a run, or nothing."""
+    _write_open(row, outputs)
+    if sent == at.MOTION:
+        status = walls(prm, inputs[: at.MOTION_SIZE], row)
+        if status != OK and not (status == STEEP and state[at.GONE] != 0.0):
+            return status
+        friction(prm, inputs[: at.MOTION_SIZE], row[at.SCRATCH : at.SCRATCH + 2], row)
+    if state[at.GONE] != 0.0:
+        silence(row)
+    state[at.SENT] = sent
+    state[at.BRISTLE], state[at.BRISTLE + 1] = row[at.ELONGATION], row[at.ELONGATION + 1]
+    state[at.IMPULSE] = state[at.SLIP_MAX] = 0.0
+    state[at.NORMAL_MAX], state[at.DEEPEST_MAX] = row[at.NORMAL], row[at.DEEPEST]
+    if state[at.TOUCH_TIME] == at.NOT_YET and row[at.NORMAL] > 0.0:
+        state[at.TOUCH_TIME] = t + h
+    _remember(state, inputs, row, h)
+    _write_point(row, outputs)
+    write_instant(row, outputs)
     write_memory(state, outputs)
     return OK
 

@@ -215,6 +215,7 @@ class Contact:
         self.state[at.ARC] = self._value("initial.s")
         self.state[at.DEEPEST_MAX] = -math.inf
         self.state[at.TOUCH_TIME] = at.NOT_YET
+        self.state[at.SENT] = exchange.what_is_sent(self._prm, inputs, at.MOTION)
         self.refresh()
         outputs = self.values[self._OUTPUTS]
         self.state[at.STORED] = outputs[at.O_STRAIN]

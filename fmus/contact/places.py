@@ -87,7 +87,7 @@ ROTATION_MEAN = 39
 CURVATURE = 42  # d²r/ds² of the cable at its point, 1/m
 INPUT_SIZE = 45
 
-# --- state of the module (43,)
+# --- state of the module (44,)
 LAST = 0  # motion at the last communication point, as it came in
 BRISTLE = 24  # two numbers, m: elongation
 ARC = 26  # one number, m: arc length of the contact point
@@ -105,8 +105,10 @@ DEEPEST_MAX = 39  # one number, m
 SLIP_MAX = 40  # one number, m/s, while cable and wheel touch
 IMPULSE = 41  # one number, N s: of the normal force over the last macro step
 TOUCH_TIME = 42  # one number, s: of the first touch; NOT_YET before
-STATE_SIZE = 43
+SENT = 43  # what came in at the last communication point: of the three below
+STATE_SIZE = 44
 NOT_YET = -1.0
+MOTION, NOTHING, FAR = 0.0, 1.0, 2.0  # a motion; zeros; after zeros, one of a cable point far from the wheel
 
 # --- outputs of the module (42,)
 O_CABLE = 0  # force, moment, force rate, moment rate on the cable

@@ -34,7 +34,7 @@ import pythonfmu
 from pythonfmu._version import __version__ as PYTHONFMU_VERSION
 
 from fmus.face import fmu_start
-from fmus.face.fmu_start import digest, package_folder
+from fmus.face.fmu_start import NEEDS, digest, package_folder
 from fmus.face.lock import locked
 from fmus.face.model_description import documentation, model_description
 from fmus.kernels import cache
@@ -46,6 +46,8 @@ from fmus.module.variables import ModuleError, VariableTable
 
 PYTHONFMU = Path(pythonfmu.__file__).parent
 RECORD = "resources/recipe.json"
+SHIPPED = ("pythonfmu", "llvmlite")
+"""What is in every FMU, and what Numba brings."""
 EPOCH = int(os.environ.get("SOURCE_DATE_EPOCH", 315532800))
 """Date of every file in an FMU, s: 1980-01-01 (zip knows none earlier) or what the environment asks for."""
 
@@ -197,6 +199,16 @@ def make_bundle(recipe: FmuRecipe, sources: Mapping[str, str]) -> Bundle:
     return Bundle(name, f"{new_names[package]}.{rest}", files)
 
 
+def requirements(bundle: Bundle) -> list[str]:
+    """Return the libraries that a bundle imports, as requirements of pip: those of ours with their versions."""
+    trees = [ast.parse(content) for content in bundle.files.values()]
+    nodes = [node for tree in trees for node in ast.walk(tree)]
+    names = {alias.name for node in nodes if isinstance(node, ast.Import) for alias in node.names}
+    names |= {node.module or "" for node in nodes if isinstance(node, ast.ImportFrom) and not node.level}
+    there = {*sys.stdlib_module_names, *SHIPPED, bundle.name}
+    return [name + NEEDS.get(name, "") for name in sorted({name.split(".")[0] for name in names} - there)]
+
+
 def rename_imports(source: str, new_names: Mapping[str, str], path: Path) -> str:
     """Return `source` with the packages in its import statements renamed."""
     pattern = rf"^(\s*(?:from|import)\s+)({'|'.join(map(re.escape, new_names))})(?=[.\s])"
@@ -221,7 +233,7 @@ def assemble(recipe: FmuRecipe) -> bytes:
     """Return the content of the FMU of `recipe`."""
     facts = record(recipe)
     bundle = make_bundle(recipe, facts["sources"])
-    with tempfile.TemporaryDirectory() as staging:
+    with tempfile.TemporaryDirectory(prefix=f"line-landing-{os.getpid()}-") as staging:
         for place, content in bundle.files.items():
             path = Path(staging, place)
             path.parent.mkdir(parents=True, exist_ok=True)
@@ -232,10 +244,12 @@ def assemble(recipe: FmuRecipe) -> bytes:
     guid = str(uuid.uuid5(uuid.NAMESPACE_URL, json.dumps(facts, sort_keys=True)))
     date = datetime.datetime.fromtimestamp(EPOCH, datetime.UTC).strftime("%Y-%m-%dT%H:%M:%SZ")
     script_name = f"{recipe.name}_{guid.replace('-', '')}"
+    needs = requirements(bundle)
     script = make_script(recipe, script_name, facts["sources"], bundle, bundle_digest)
     files = {
         "modelDescription.xml": model_description(recipe, table, values, f"{{{guid}}}", date),
-        "documentation/index.html": documentation(recipe, table, values, _readme(recipe)).encode(),
+        "documentation/index.html": documentation(recipe, table, values, _readme(recipe), needs).encode(),
+        "resources/requirements.txt": "\n".join([*needs, ""]).encode(),
         RECORD: json.dumps(facts, indent=1, sort_keys=True).encode(),
         "resources/slavemodule.txt": script_name.encode(),
         f"resources/{script_name}.py": script.encode(),
@@ -310,14 +324,13 @@ def pack(files: Mapping[str, bytes]) -> bytes:
 
 def write_atomically(path: Path, content: bytes) -> None:
     """Write `content` to `path`, all of it or nothing."""
-    handle, draft = tempfile.mkstemp(dir=path.parent, prefix=f".{path.name}.")
+    draft = path.with_name(f".{path.stem}.{os.getpid()}{path.suffix}")
     try:
-        with os.fdopen(handle, "wb") as file:
-            file.write(content)
-        os.chmod(draft, 0o644)
+        draft.write_bytes(content)
+        draft.chmod(0o644)
         os.replace(draft, path)
     except BaseException:
-        os.unlink(draft)
+        draft.unlink(missing_ok=True)
         raise
 
 

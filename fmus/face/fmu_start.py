@@ -21,6 +21,10 @@ from pathlib import Path
 
 from fmus.kernels.cache import prune, used, user_folder
 
+PYTHON = ">=3.11"
+NEEDS = {"numpy": ">=1.26,<3", "numba": ">=0.60"}
+"""What our modules need of the interpreter that loads them, as in pyproject.toml. Numba brings llvmlite."""
+
 
 def digest(folder: Path) -> str:
     """Return a hash of all Python sources below `folder` (16 hexadecimal digits)."""
@@ -94,9 +98,12 @@ def load_package(resources: Path, sources: dict[str, str], bundle: str, expected
         return bundle
     except ModuleNotFoundError as error:
         where = f"Python {sys.version.split()[0]} at {sys.prefix}"
-        raise ImportError(
-            f"{error}. The FMU needs NumPy and Numba in the running {where}; install them there."
-        ) from error
+        raise ImportError(f"{error}. The FMU needs {needs()}; install that in the running {where}.") from error
+
+
+def needs() -> str:
+    """Return what our FMUs need, in words."""
+    return f"Python {PYTHON} with {' and '.join(name + version for name, version in NEEDS.items())}"
 
 
 def hold(namespace: dict[str, object]) -> None:

@@ -3,12 +3,13 @@
 from __future__ import annotations
 
 import html
-from collections.abc import Iterable
+from collections.abc import Iterable, Sequence
 from xml.etree.ElementTree import Element, SubElement, indent, tostring
 
 import numpy as np
 from pythonfmu._version import __version__ as PYTHONFMU_VERSION
 
+from fmus.face.fmu_start import PYTHON
 from fmus.module.recipe import FmuRecipe
 from fmus.module.units import unit
 from fmus.module.variables import Variable, VariableTable
@@ -130,8 +131,15 @@ def _add_unknown(parent: Element, place: int, dependencies: list[int]) -> None:
     SubElement(parent, "Unknown", index=str(place + 1), dependencies=" ".join(str(i + 1) for i in dependencies))
 
 
-def documentation(recipe: FmuRecipe, table: VariableTable, values: np.ndarray, readme: str) -> str:
-    """Return ``documentation/index.html``: the variables with their start values, then the README."""
+def documentation(
+    recipe: FmuRecipe, table: VariableTable, values: np.ndarray, readme: str, needs: Sequence[str]
+) -> str:
+    """Return ``documentation/index.html``: what it needs, the variables with their start values, then the README.
+
+    Parameters
+    ----------
+    needs : the libraries, as requirements of pip
+    """
     rows = "\n".join(_row(v, values[i]) for i, v in enumerate(table.variables))
     title = html.escape(f"{recipe.name}: {recipe.description}")
     return f"""<!DOCTYPE html>
@@ -139,7 +147,8 @@ def documentation(recipe: FmuRecipe, table: VariableTable, values: np.ndarray, r
 <head><meta charset="utf-8"><title>{title}</title></head>
 <body>
 <h1>{title}</h1>
-<p>FMI 2.0 co-simulation. It runs in Python: the interpreter that loads it needs NumPy and Numba.
+<p>FMI 2.0 co-simulation. It runs in Python: the interpreter that loads it is Python {html.escape(PYTHON)} and has
+{html.escape(", ".join(needs))}; <code>pip install -r resources/requirements.txt</code>. Nothing else is needed.
 A step that fails is discarded and leaves the FMU as it was; a failed initialisation is fatal; the log says
 why.</p>
 <table>

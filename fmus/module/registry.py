@@ -17,7 +17,7 @@ from typing import Literal
 from fmus.module.recipe import FmuRecipe, make_module
 from fmus.module.variables import ModuleError, Value, VariableTable
 
-Contract = Literal["cable", "robot", "contact"]
+Contract = Literal["cable", "robot", "contact", "controller"]
 
 ENTRY_POINTS = "line_landing.modules"
 """Group of entry points in which other packages name their modules."""
@@ -80,6 +80,7 @@ _ENTRIES = (
         "robot",
         ("kinetic_energy", "gravitational_energy", "control_work"),
     ),
+    ModuleEntry("setdown", "fmus.controller.module:Setdown", "Controller that sets a robot down", "controller"),
     ModuleEntry("oscillator", "fmus.oscillator.module:Oscillator", "Mass between springs"),
 )
 MODULES: dict[str, ModuleEntry] = {entry.key: entry for entry in _ENTRIES}

@@ -76,7 +76,8 @@ class Variable:
     description : one line
     kind : FMI type; strings are choices, stored as the index into `choices`
     choices : the words a string may take
-    discrete : changes at communication points only (an input is held, an output moves, between them)
+    discrete : changes at communication points only (an input is held, an output moves, between them); a parameter that
+        does is a tunable one
     feedthrough : names of the inputs an output depends on without a step (outputs only)
     bounds : of parameters and inputs
     """

@@ -11,9 +11,14 @@ from pathlib import Path
 from typing import Any
 
 from orchestrator.coupling.errors import InputError
+from orchestrator.coupling.reading import text_of
 
 Document = dict[str, Any]
 EXTENDS = "extends"
+WHAT = "a TOML file"
+DEEPEST, LONGEST = 24, 2**64
+"""Tables and arrays in one another; the least whole number that is too long, for an FMU's may have 64 bits without a sign."""
+TOO_DEEP = f"its tables lie more than {DEEPEST} deep in one another"
 
 
 def is_quantity(value: Any) -> bool:
@@ -127,11 +132,40 @@ def _parsed(path: Path) -> Document:
     """Return the content of a file, which whoever asks may change."""
     known = _known.get()
     if known is None:
-        return tomllib.loads(path.read_text(encoding="utf-8"))
+        return parsed(text_of(path, WHAT))
     place = path.resolve()
     if place not in known:
-        known[place] = tomllib.loads(path.read_text(encoding="utf-8"))
+        known[place] = parsed(text_of(path, WHAT))
     return _copied(known[place])
+
+
+def parsed(text: str) -> Document:
+    """Return what a text in TOML says; `ValueError` says what is wrong with it."""
+    try:
+        content = tomllib.loads(text)
+    except RecursionError:
+        raise ValueError(TOO_DEEP) from None
+    _require_plain(content)
+    return content
+
+
+def _require_plain(content: Document) -> None:
+    """Raise `ValueError` where tables lie too deep in one another, or a whole number is longer than TOML's."""
+    level: list[tuple[str, Any]] = [("", content)]
+    for _ in range(DEEPEST):
+        level = [item for path, value in level for item in _below(path, value)]
+        long = next((path for path, value in level if isinstance(value, int) and abs(value) >= LONGEST), None)
+        if long is not None:
+            raise ValueError(f"{long}: a whole number has 64 bits at most; write a real one, 1e30")
+    if any(isinstance(value, dict | list) for _, value in level):
+        raise ValueError(TOO_DEEP)
+
+
+def _below(path: str, value: Any) -> Iterator[tuple[str, Any]]:
+    """Yield what a table or an array holds, with its path."""
+    items = value.items() if isinstance(value, dict) else enumerate(value, 1) if isinstance(value, list) else ()
+    for key, item in items:
+        yield (f"{path}[{key}]" if isinstance(value, list) else f"{path}.{key}".lstrip(".")), item
 
 
 def _copied(content: Any) -> Any:
@@ -145,20 +179,20 @@ def read(path: Path) -> Document:
     """Return the content of a TOML file; `InputError` names file, cause and cure."""
     try:
         return _parsed(path)
-    except OSError as error:
-        raise InputError(f"{path}: cannot be read ({error.strerror}); check the path") from None
-    except UnicodeDecodeError as error:
-        raise InputError(f"{path}: not a TOML file: no UTF-8 text ({error.reason}); save it as UTF-8") from None
-    except tomllib.TOMLDecodeError as error:
-        raise InputError(f"{path}: not a TOML file: {error}; mend that line") from None
+    except ValueError as error:
+        cure = "; mend that line" if isinstance(error, tomllib.TOMLDecodeError) else ""
+        raise InputError(f"{path}: not {WHAT}: {error}{cure}") from None
 
 
-def chain(path: Path, find: Callable[[str, Path], Path]) -> list[tuple[Path, Document]]:
+def chain(
+    path: Path, find: Callable[[str, Path], Path], content: Callable[[Path], Document] = read
+) -> list[tuple[Path, Document]]:
     """Return the file at `path` and those that it extends, each with its content, the farthest base first.
 
     Parameters
     ----------
     find : what ``extends = "…"`` names, and the folder of the file in which it stands → the file's path
+    content : what a file says
     """
     found: list[tuple[Path, Document]] = []
     base: Path | None = path
@@ -168,7 +202,7 @@ def chain(path: Path, find: Callable[[str, Path], Path]) -> list[tuple[Path, Doc
             raise InputError(
                 f"{found[-1][0]}: {EXTENDS}: {circle} is a circle; extend a file that does not lead back here"
             )
-        document = read(base)
+        document = content(base)
         found.append((base, document))
         base = _base(base, document.pop(EXTENDS, None), find)
     return found[::-1]

@@ -14,6 +14,7 @@ from fmus.module import registry
 from fmus.module.recipe import FmuRecipe
 from orchestrator.catalogue.robot_spec import RobotSpec, catalogue
 from orchestrator.coupling.errors import InputError
+from orchestrator.coupling.scratch import remove_left_overs, remove_parts
 
 
 def module_fmu(name: str) -> Path:
@@ -45,6 +46,7 @@ def build_all(folder: Path | None) -> list[Path]:
     from fmus.face.build import ensure_all, plain
     from fmus.face.first_use import compile_modules
 
+    remove_left_overs()
     ours = [module_recipe(key) for key in registry.OURS if key != "robot"]  # robots: those of the catalogue
     recipes = (*ours, *map(robot_recipe, catalogue().values()))
     if folder is None:
@@ -76,6 +78,8 @@ def _folder() -> Path:
 
 def _within(folder: Path, build: Callable[[], list[Path]]) -> list[Path]:
     try:
+        if folder.is_dir():
+            remove_parts(folder)
         return build()
     except OSError as error:
         cure = "choose a folder to write to with LINE_LANDING_FMUS (`build`: --out)"

@@ -3,12 +3,16 @@
 from __future__ import annotations
 
 import zipfile
+from collections.abc import Mapping
 from pathlib import Path
 from typing import Any
 
 from fmus.module import registry
 from fmus.module.variables import Bounds, Kind, ModuleError, Value, Variable
 from orchestrator.coupling.errors import InputError
+from orchestrator.coupling.reading import is_file
+
+NOTHING: Mapping[str, Any] = {}
 
 
 def of_module(kind: str, robot: str | None = None) -> dict[str, Variable]:
@@ -31,13 +35,24 @@ def of_module(kind: str, robot: str | None = None) -> dict[str, Variable]:
     return {v.name: v for v in table.variables}
 
 
-def of_fmu(path: Path) -> dict[str, Variable]:
-    """Return the variables of the FMU at `path` by name; raise `InputError` if it is none."""
-    from orchestrator.coupling.fmu.description import KINDS, element_names
+def of_fmu(path: Path, settings: Mapping[str, Any] = NOTHING) -> dict[str, Variable]:
+    """Return the variables of the FMU at `path` by name; raise `InputError` if it is none.
+
+    Parameters
+    ----------
+    settings : values of parameters; on structural ones the lengths of arrays hang
+    """
+    from orchestrator.coupling.fmu.description import KINDS, STRUCTURAL, element_names, structure_of
 
     known: dict[str, Variable] = {}
-    for v in description(path).modelVariables:
-        parameter = v.causality == "parameter" or (v.causality == "local" and v.variability == "tunable")
+    found = description(path)
+    try:
+        structure = structure_of(found, settings)
+    except ValueError as error:
+        raise InputError(f"{path}: {error}") from None
+    for v in found.modelVariables:
+        tunable = v.causality == "parameter" and v.variability == "tunable"
+        parameter = v.causality in ("parameter", STRUCTURAL) or (v.causality == "local" and v.variability == "tunable")
         kind = KINDS.get(v.type, "integer")
         if kind in ("binary", "clock"):  # nothing that a scenario or a contract speaks of
             continue
@@ -48,8 +63,9 @@ def of_fmu(path: Path) -> dict[str, Variable]:
             v.description or "",
             kind,
         )
-        bounds = _bounds(v)
-        known |= {name: Variable(name, *fixed, bounds=bounds) for name in element_names(v)}
+        bounds = Bounds(ge=1) if v.causality == STRUCTURAL and not v.min else _bounds(v)
+        names = element_names(v, structure)
+        known |= {name: Variable(name, *fixed, discrete=tunable, bounds=bounds) for name in names}
     return known
 
 
@@ -80,14 +96,18 @@ def _start(text: str | None, kind: Kind) -> Value:
 
 def description(path: Path) -> Any:
     """Return FMPy's model description of the FMU at `path`; raise `InputError` if it is none."""
-    if not path.is_file():
+    if not is_file(path):
         raise InputError(f"{path}: no such file")
     if not zipfile.is_zipfile(path):
         raise InputError(f"{path}: not an FMU: not a zip archive")
+    from orchestrator.coupling.fmu.archive import ArchiveError
     from orchestrator.coupling.fmu.description import parsed
+    from orchestrator.coupling.fmu.standard import DescriptionError
 
     try:
         return parsed(path)
+    except (ArchiveError, DescriptionError) as error:
+        raise InputError(f"{path}: not an FMU: {error}") from None
     except Exception as error:  # FMPy and lxml raise many kinds; each means the same to the user
         raise InputError(f"{path}: not an FMU: its modelDescription.xml cannot be read: {error}") from None
 

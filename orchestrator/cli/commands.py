@@ -1,14 +1,17 @@
 """The command line. Progress and errors go to stderr, answers to stdout.
 
 Exit status: 0 done and within tolerance; 1 done, but a tolerance or a safety limit is missed; 2 wrong input;
-3 the run failed; 130 interrupted. What is heavy is imported where it is used, so that ``--help`` is quick.
+3 the run failed; 70 a fault of this program; 130 interrupted; 128 + the number of another signal that has ended it. What is
+heavy is imported where it is used, so that ``--help`` is quick.
 """
 
 from __future__ import annotations
 
+import errno
 import os
 import sys
 import warnings
+from contextlib import suppress
 from pathlib import Path
 from typing import Annotated, Any
 
@@ -16,10 +19,20 @@ import typer
 from typer.core import TyperGroup
 
 import orchestrator
-from orchestrator.cli import modes, new, options, printing
+from orchestrator.cli import modes, new, options, printing, streams
+from orchestrator.cli.check import check
+from orchestrator.cli.export import export
 from orchestrator.cli.identify import identify
+from orchestrator.cli.net import under_the_net
 from orchestrator.cli.start import importing
 from orchestrator.cli.sweep import sweep
+from orchestrator.coupling.signals import Stopped, ending
+from orchestrator.runs import last_net
+
+ANSWERS = ("list", "validate", "limits", "check")
+"""Commands that print, and leave nothing else: where their answer cannot be printed they have failed."""
+NO_PATH = (errno.ENAMETOOLONG, errno.ELOOP, errno.ENOTDIR, errno.EISDIR)
+"""Of names that nothing can have there, and of folders in the place of files."""
 
 
 class Commands(TyperGroup):
@@ -30,9 +43,14 @@ class Commands(TyperGroup):
         warnings.simplefilter("once")  # a scenario may be read for every master and step
         warnings.showwarning = lambda message, *_: printing.complain(str(message))
         try:
-            return super().invoke(ctx)
-        except (Exception, KeyboardInterrupt) as error:
+            done = super().invoke(ctx)
+            if streams.lost() is not None and ctx.invoked_subcommand in ANSWERS:
+                raise typer.Exit(3)  # which says why in the end
+            return done
+        except (Exception, KeyboardInterrupt, Stopped) as error:
             status = _explained(error)
+            if status is None and isinstance(error, EOFError):  # Typer would make status 1 of it
+                raise RuntimeError("EOFError: the end of a file or a pipe") from error
             if status is None:
                 raise
             raise typer.Exit(status) from None
@@ -40,21 +58,25 @@ class Commands(TyperGroup):
 
 def _explained(error: BaseException) -> int | None:
     """Say on stderr what ended a command and return its exit status; None where that is for others to say."""
-    from orchestrator.coupling.errors import FAILED, INTERRUPTED, OrchestratorError
+    from orchestrator.coupling.errors import FAILED, INTERRUPTED, SIGNALLED, WRONG_INPUT, OrchestratorError
 
     if isinstance(error, OrchestratorError):
         for line in str(error).splitlines():
             printing.complain(line)
         return error.exit_status
+    if isinstance(error, Stopped):
+        printing.complain(str(error))
+        return SIGNALLED + error.number
     if isinstance(error, KeyboardInterrupt):
         printing.complain("interrupted")
         return INTERRUPTED
     if isinstance(error, OSError) and not isinstance(
         error, BrokenPipeError
     ):  # a full disk, a folder that was taken away
-        cure = "make room or choose another place with --out"
-        printing.complain(f"{error.filename or 'results'}: {error.strerror}; {cure}")
-        return FAILED
+        wrong = error.errno in NO_PATH
+        cure = "check the path" if wrong else "make room or choose another place with --out"
+        printing.complain(f"{error.filename or 'results'}: {error.strerror or error}; {cure}")
+        return WRONG_INPUT if wrong else FAILED
     return None
 
 
@@ -66,7 +88,7 @@ app = typer.Typer(
     context_settings={"help_option_names": ["-h", "--help"]},
     help="Land power-line robots on a flexible cable: FMUs coupled, and held against a monolithic solver.",
     epilog="Exit status: 0 done and within tolerance; 1 a tolerance or safety limit is missed; "
-    "2 wrong input; 3 the run failed; 130 interrupted.",
+    "2 wrong input; 3 the run failed; 70 a fault of this program; 130 interrupted.",
 )
 app.add_typer(new.app, name="new")
 
@@ -116,6 +138,7 @@ def validate(scenario: options.Scenario, robot: options.Robot = None, set_: opti
         from orchestrator.api import load_scenario
         from orchestrator.landing.line_state import rest_words
         from orchestrator.runs.components import master_of, opened
+        from orchestrator.runs.foreign import executed
         from orchestrator.runs.systems import LandingSystem, resolve
 
     loaded = load_scenario(scenario, set=set_, robot=robot)
@@ -123,6 +146,10 @@ def validate(scenario: options.Scenario, robot: options.Robot = None, set_: opti
     with opened(system) as graph:
         master_of(loaded, graph)
         print(f"{scenario}: valid; {len(graph.components)} FMUs, {len(list(graph.connections))} connections")
+        print(executed(graph))
+        apart = [name for name, fmu in graph.components.items() if fmu.limits]
+        if apart:
+            print(f"in processes of their own: {', '.join(apart)}")
         for note in system.notes(graph):
             print(note)
     if isinstance(system, LandingSystem) and system.landing.rest is not None:
@@ -144,22 +171,7 @@ def limits(scenario: options.Scenario, robot: options.Robot = None, set_: option
         print(line)
 
 
-@app.command()
-def check(
-    fmu: Annotated[Path, typer.Argument(metavar="FILE.fmu", help="The FMU.")],
-    contract: Annotated[
-        str | None, typer.Option(help="robot, cable or contact. Default: the one it suits best.")
-    ] = None,
-) -> None:
-    """Check an FMU against a contract, point by point: that of a robot, a cable or a contact."""
-    from orchestrator.coupling.errors import DONE, MISSED
-    from orchestrator.landing.contract import check_fmu, is_met
-
-    kind, findings = check_fmu(fmu, contract)
-    printing.print_findings(kind, findings)
-    met = is_met(findings)
-    print(f"{fmu}: {'meets' if met else 'does not meet'} the {kind} contract")
-    raise typer.Exit(DONE if met else MISSED)
+app.command()(check)
 
 
 @app.command()
@@ -285,19 +297,25 @@ def reproduce(
     raise typer.Exit(done.exit_status)
 
 
+app.command()(export)
 app.command()(identify)
 app.command()(sweep)
 
 
 @app.command()
 def report(
-    directory: Annotated[Path, typer.Argument(metavar="DIR", help="Directory of a finished run.")],
+    directory: Annotated[Path, typer.Argument(metavar="DIR", help="Directory of a run.")],
 ) -> None:
-    """Draw pictures and a page of finished results."""
+    """Draw pictures and a page of results: of a finished run, or of what an unfinished one has left so far."""
     with importing():
-        from orchestrator.report.page import report as make
+        from orchestrator.api import report_of
+        from orchestrator.coupling.run.results import read_json
 
-    print(make(directory))
+    page = report_of(directory)
+    manifest = page.parent / "manifest.json"
+    if manifest.is_file() and (error := read_json(manifest)["error"]) is not None:
+        printing.complain(f"{page.parent}: {error}")
+    print(page)
 
 
 def _numbers(text: str | None) -> list[float]:
@@ -316,18 +334,37 @@ def _items(text: str | None) -> list[str]:
 
 def main(arguments: list[str] | None = None) -> None:
     """Run the command line and end the process with its exit status."""
-    printing.forgive_encodings()
+    last_net.noted.clear()
     try:
-        app(arguments)
+        with under_the_net(sys.argv[1:] if arguments is None else arguments):
+            streams.forgive()
+            with ending():
+                app(arguments)
     except SystemExit as end:
+        status = _status(end)
         if _left_behind():
-            from orchestrator.coupling.errors import FAILED
-
             # the thread that waits for an FMU which hangs cannot be ended; only the process can
-            sys.stdout.flush()
-            sys.stderr.flush()
-            os._exit(end.code if isinstance(end.code, int) else FAILED)
-        raise
+            for stream in (sys.stdout, sys.stderr):
+                with suppress(AttributeError, OSError, ValueError):  # closed
+                    stream.flush()
+            os._exit(status)
+        raise SystemExit(status) from None
+    finally:
+        _say_what_is_lost()
+
+
+def _status(end: SystemExit) -> int:
+    """Return how the process ends: as the command did, but never well where a worker met a fault of this program."""
+    status = end.code if isinstance(end.code, int) else 0 if end.code is None else last_net.INTERNAL
+    return last_net.INTERNAL if last_net.noted and status in (0, 1) else status
+
+
+def _say_what_is_lost() -> None:
+    """Say on stderr that answers could not be printed."""
+    if (failure := streams.lost()) is not None:
+        printing.complain(f"standard output: {failure.strerror}; what was to be printed is lost, results are kept")
+    with suppress(AttributeError, OSError, ValueError):  # closed
+        sys.stderr.flush()
 
 
 def _left_behind() -> bool:

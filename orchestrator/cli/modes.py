@@ -68,16 +68,17 @@ def _write_modes(directory: RunDirectory, found: CableModes | SystemModes, scena
     from orchestrator.landing.robot_modes import over_positions
     from orchestrator.report import modes as pictures
     from orchestrator.report import robot_modes as pictures_with_robot
+    from orchestrator.report.drawn import drawn
     from orchestrator.runs import modes as tables
     from orchestrator.runs import robot_modes as tables_with_robot
     from orchestrator.scenario.types import LandingScenario
 
     if isinstance(found, CableModes):
         tables.write_modes(directory, found)
-        pictures.draw(directory.path)
+        drawn(lambda: pictures.draw(directory.path))
         return
     assert isinstance(scenario, LandingScenario)  # others have no modes
     tables_with_robot.write_modes(directory, found)
     if positions > 0:
         tables_with_robot.write_positions(directory, over_positions(scenario, positions))
-    pictures_with_robot.draw(directory.path, scenario.landing.position)
+    drawn(lambda: pictures_with_robot.draw(directory.path, scenario.landing.position))

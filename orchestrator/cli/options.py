@@ -8,15 +8,16 @@ from typing import Annotated
 
 import typer
 
+OSP_FILE = "OspSystemStructure.xml"
 # -- completion -----------------------------------------------------------------------------------------------
 
 
 def scenarios(incomplete: str) -> Iterator[str]:
-    """Yield the shipped scenarios, the files and the folders that `incomplete` may become."""
+    """Yield the shipped scenarios, the files (system structures, too) and the folders that `incomplete` may become."""
     from orchestrator.catalogue.listing import scenarios
 
     yield from starting(incomplete, scenarios())
-    yield from files(incomplete, ".toml")
+    yield from files(incomplete, ".toml", ".ssp", OSP_FILE)
 
 
 def robots(incomplete: str) -> Iterator[str]:
@@ -52,7 +53,9 @@ def starting(incomplete: str, names: Iterable[str]) -> Iterator[str]:
 Scenario = Annotated[
     str,
     typer.Argument(
-        metavar="SCENARIO", help="Scenario file (TOML), or the name of a shipped one.", autocompletion=scenarios
+        metavar="SCENARIO",
+        help="Scenario file (TOML, SSP, OSP), or the name of a shipped one.",
+        autocompletion=scenarios,
     ),
 ]
 Out = Annotated[

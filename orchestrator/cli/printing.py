@@ -2,15 +2,15 @@
 
 from __future__ import annotations
 
-import sys
 from collections.abc import Callable, Iterable, Iterator, Mapping, Sequence
 from contextlib import contextmanager
-from io import TextIOWrapper
 from math import isnan
 from pathlib import Path
 from typing import TYPE_CHECKING, Any
 
 import typer
+
+from orchestrator.cli.terminal import complain
 
 if TYPE_CHECKING:
     from orchestrator.landing.contract import Finding
@@ -57,6 +57,9 @@ def print_run(run: Run) -> None:
     _print_estimates(run)
     if run.energy is not None:
         print(f"energy drift: {run.energy.drift:.2g} J of {run.energy.exchanged:.3g} J exchanged")
+    if (made := summary.get("energy_made")) is not None:
+        booked = f"{made['loads_booked']} of {made['loads']} loads booked"
+        print(f"energy made by the coupling: {made['end_J']:.2g} J, at most {made['largest_J']:.2g} J on the way; {booked}")
 
 
 def page_of(directory: Path | None) -> str:
@@ -304,15 +307,3 @@ def complain_of(runs: Iterable[Run]) -> None:
     for run in runs:
         for line in run.warnings:
             complain(f"{run.label}: {line}")
-
-
-def complain(message: str) -> None:
-    """Say on stderr what is wrong."""
-    print(f"orchestrator: {message}", file=sys.stderr)
-
-
-def forgive_encodings() -> None:
-    """Let what a terminal or a pipe cannot show appear as an escape, not as an error."""
-    for stream in (sys.stdout, sys.stderr):
-        if isinstance(stream, TextIOWrapper):
-            stream.reconfigure(errors="backslashreplace")

@@ -35,6 +35,7 @@ def sweep(
     """
     with importing():
         from orchestrator.coupling.errors import DONE, MISSED
+        from orchestrator.report.drawn import drawn
         from orchestrator.studies.sweep import bars, maps, odds, write
         from orchestrator.studies.sweep.solve import sweep as run_all
         from orchestrator.studies.sweep.study import load_study, path_of
@@ -47,8 +48,12 @@ def sweep(
         )
     _print(found)
     print(f"table in {folder / write.TABLE}")
-    drawn = maps.write(folder, read, found.outcomes), odds.write(folder, read, found.chances)
-    for path in [*chain(*drawn), *bars.write(folder, found.sensitivities)]:
+    pictures = (
+        lambda: maps.write(folder, read, found.outcomes),
+        lambda: odds.write(folder, read, found.chances),
+        lambda: bars.write(folder, found.sensitivities),
+    )
+    for path in chain(*map(drawn, pictures)):
         print(f"picture in {path}")
     if (missing := write.page(folder)) is not None:
         printing.complain(missing)

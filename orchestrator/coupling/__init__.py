@@ -11,8 +11,8 @@
 *Inputs over time*: `Course`, a table of times and values; `read_courses` has those of a CSV file; `Graph(…, inputs=…)`.
 *Masters*: `MASTERS` has them all by name; each is a class with its options as keyword arguments. A new one derives from
 `Master`, or from `Implicit` with an `Accelerator` of its own; each macro step leaves a `StepReport`.
-*Runs*: `simulate` makes a `Log`; `read_table` reads a `Table` from a file, `signal_errors` holds two of them against each
-other, `observed_order` is the slope of such errors over the step.
+*Runs*: `simulate` makes a `Log`, of every communication point or of some (`Interval`); `read_table` reads a `Table` from a
+file, `signal_errors` holds two of them against each other, `observed_order` is the slope of such errors over the step.
 
 Names are imported when they are first used, so that importing this package costs nothing.
 """
@@ -40,6 +40,7 @@ __all__ = [  # noqa: F405 (all in `api`)
     "Implicit",
     "InputError",
     "InterfaceJacobian",
+    "Interval",
     "IqnIls",
     "Jacobi",
     "Log",

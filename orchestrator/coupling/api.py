@@ -25,6 +25,7 @@ from orchestrator.coupling.masters.semi_implicit import SemiImplicit as SemiImpl
 from orchestrator.coupling.run.compare import SignalError as SignalError
 from orchestrator.coupling.run.compare import observed_order as observed_order
 from orchestrator.coupling.run.compare import signal_errors as signal_errors
+from orchestrator.coupling.run.interval import Interval as Interval
 from orchestrator.coupling.run.log import Log as Log
 from orchestrator.coupling.run.results import Table as Table
 from orchestrator.coupling.run.results import read_table as read_table

@@ -20,6 +20,8 @@ from pathlib import Path
 
 PLAIN = re.compile(r"[A-Za-z0-9_./\\:-]+")
 """Paths that every loader of FMUs can read."""
+MEGABYTES = "LINE_LANDING_CACHE_MB"
+"""Environment variable: room for unzipped FMUs."""
 KEPT_DAYS = 30
 """Days without use after which an entry is removed."""
 _said: set[Path] = set()
@@ -102,6 +104,43 @@ def prune(folder: Path, days: float = KEPT_DAYS) -> None:
         with contextlib.suppress(OSError):
             if entry.lstat().st_mtime < oldest:
                 remove(entry)
+
+
+def shrink(folder: Path, megabytes: float) -> None:
+    """Remove the entries of `folder` that nobody has used for longest where all take more room than `megabytes`.
+
+    ``LINE_LANDING_CACHE_MB`` is taken instead where it is set. What has been used within a day stays: it may be in use now.
+    """
+    room, old = 1e6 * _megabytes(megabytes), time.time() - 86400.0
+    entries = sorted((_used_at(entry), _size(entry), entry) for entry in (folder.iterdir() if folder.is_dir() else ()))
+    total = sum(size for _, size, _ in entries)
+    for when, size, entry in entries:
+        if total <= room or when > old:
+            return
+        remove(entry)
+        total -= size
+
+
+def _megabytes(otherwise: float) -> float:
+    with contextlib.suppress(ValueError):
+        return float(os.environ.get(MEGABYTES) or otherwise)
+    return otherwise
+
+
+def _used_at(entry: Path) -> float:
+    with contextlib.suppress(OSError):
+        return entry.lstat().st_mtime
+    return 0.0
+
+
+def _size(entry: Path) -> int:
+    """Return the bytes of a file, or of all files of a folder."""
+    total = 0
+    for place, _, names in os.walk(entry):
+        for name in names:
+            with contextlib.suppress(OSError):
+                total += os.lstat(os.path.join(place, name)).st_size
+    return total
 
 
 def remove(entry: Path) -> None:

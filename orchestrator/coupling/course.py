@@ -9,6 +9,7 @@ from __future__ import annotations
 import csv
 from bisect import bisect_left, bisect_right
 from collections.abc import Iterable, Sequence
+from io import StringIO
 from itertools import pairwise
 from pathlib import Path
 from typing import Literal
@@ -16,6 +17,7 @@ from typing import Literal
 import numpy as np
 
 from orchestrator.coupling.errors import InputError
+from orchestrator.coupling.reading import text_of
 
 ROUNDING = 1e-12
 """Relative; a jump that lies after a communication point by less belongs to it."""
@@ -130,12 +132,9 @@ def read_courses(path: Path, interpolation: Interpolation = "linear") -> dict[st
 def read_columns(path: Path) -> tuple[list[float], dict[str, list[float]]]:
     """Return the times, and the other columns by their names, of a CSV file as FMPy has it for inputs."""
     try:
-        with open(path, encoding="utf-8", newline="") as file:
-            rows = [row for row in csv.reader(file) if row]
-    except OSError as error:
-        raise InputError(f"{path}: cannot be read ({error.strerror}); check the path") from None
-    except ValueError as error:
-        raise InputError(f"{path}: cannot be read as a table of inputs: {error}; save it as UTF-8") from None
+        rows = [row for row in csv.reader(StringIO(text_of(path, "a table of inputs"))) if row]
+    except csv.Error as error:
+        raise InputError(f"{path}: cannot be read as a table of inputs: {error}") from None
     names = [name.strip() for name in rows[0]] if rows else []
     if names[:1] != ["time"] or len(names) < 2:
         raise InputError(f'{path}: its first line must be a header: "time", then names of variables')

@@ -5,8 +5,10 @@ from __future__ import annotations
 from collections.abc import Iterable
 from difflib import get_close_matches
 
-DONE, MISSED, WRONG_INPUT, FAILED, INTERRUPTED = 0, 1, 2, 3, 130
-"""Exit status: done; done, but a tolerance or safety limit is missed; wrong input; run failed; Ctrl-C."""
+DONE, MISSED, WRONG_INPUT, FAILED, INTERNAL, INTERRUPTED = 0, 1, 2, 3, 70, 130
+"""Exit status: done; done, but a tolerance or safety limit is missed; wrong input; run failed; fault of ours; Ctrl-C."""
+SIGNALLED = 128
+"""Exit status of a process that a signal has ended, less the signal's number."""
 FORWARD = "take gauss_seidel, which never goes back; with contact a macro step of 1 ms, halved until no energy drifts"
 """What works where an FMU cannot save its state (docs/notebook/masters.md)."""
 

@@ -13,13 +13,14 @@ but was not done on the other (the error of the coupling).
 from __future__ import annotations
 
 import re
-from collections.abc import Iterable, Mapping
+from collections.abc import Iterable, Iterator, Mapping
 from dataclasses import dataclass
 from typing import Any
 
 import numpy as np
 
 from fmus.module import registry
+from orchestrator.coupling.run.columns import Columns
 from orchestrator.coupling.run.results import Table
 
 GROUPS = {
@@ -52,7 +53,7 @@ class Audit:
     """
 
     time: np.ndarray
-    terms: dict[str, np.ndarray]
+    terms: Mapping[str, np.ndarray]
     sources: dict[str, np.ndarray]
     allowed: float
     round_off: float = 0.0
@@ -60,7 +61,7 @@ class Audit:
     @property
     def residual(self) -> np.ndarray:
         """Sum of all terms over time, J: zero but for errors."""
-        return np.sum(list(self.terms.values()), axis=0)
+        return total(self.terms.values())
 
     @property
     def drift(self) -> float:
@@ -115,7 +116,16 @@ class Audit:
 
 def exchanged(terms: Mapping[str, np.ndarray]) -> float:
     """Return the energy (J) exchanged between `terms`, each (n,) and counted from the start."""
-    return float(np.max(0.5 * np.sum(np.abs(list(terms.values())), axis=0)))
+    return float(np.max(0.5 * total(map(np.abs, terms.values()))))
+
+
+def total(values: Iterable[np.ndarray]) -> np.ndarray:
+    """Return the sum of several (n,), one after the other: of a long run they have no second place in memory."""
+    left = iter(values)
+    found = np.array(next(left))
+    for one in left:
+        found += one
+    return found
 
 
 def missing(table: Table) -> list[str]:
@@ -172,11 +182,27 @@ def _since_start(values: np.ndarray) -> np.ndarray:
     return np.asarray(values) - values[0]
 
 
-def _terms(table: Table) -> dict[str, np.ndarray]:
+def _terms(table: Table) -> Mapping[str, np.ndarray]:
     components = [c for c in _components(table) if c.rstrip("0123456789") in OF_COMPONENT]
     signals = [signal for component in components for signal in _signals(component)]
-    sign = {signal: -1.0 if signal.endswith("_work") else 1.0 for signal in signals}
-    return {signal: sign[signal] * _since_start(table[signal]) for signal in signals}
+    terms = _Changes(table, {signal: -1.0 if signal.endswith("_work") else 1.0 for signal in signals})
+    return terms if isinstance(table, Columns) else dict(terms)
+
+
+class _Changes(Mapping[str, np.ndarray]):
+    """Changes of signals since the start, each with its sign; of a table on disk they are made when they are asked for."""
+
+    def __init__(self, table: Table, signs: Mapping[str, float]):
+        self.table, self.signs = table, signs
+
+    def __getitem__(self, name: str) -> np.ndarray:
+        return self.signs[name] * _since_start(self.table[name])
+
+    def __iter__(self) -> Iterator[str]:
+        return iter(self.signs)
+
+    def __len__(self) -> int:
+        return len(self.signs)
 
 
 def _sources(table: Table, terms: Mapping[str, np.ndarray]) -> dict[str, np.ndarray]:
@@ -188,7 +214,7 @@ def _sources(table: Table, terms: Mapping[str, np.ndarray]) -> dict[str, np.ndar
     names = [name.format(k) for k in numbers for name in (*sides.values(), *booked.values())]
     if not all(name in table for name in names):
         return {}
-    work = {name: _since_start(table[name]) for name in names}
+    work = _Changes(table, dict.fromkeys(names, 1.0))
     own = {c: np.sum([terms[signal] for signal in _signals(c)], axis=0) for c in ("cable", "robot", *contacts)}
     found = {c: own[c] - sum(work[sides[c].format(k)] for k in numbers) for c in ("cable", "robot")}
     for k, contact in zip(numbers, contacts, strict=True):

@@ -1,7 +1,7 @@
-"""The contract between the FMUs, and whether a given FMU meets it, point by point.
+"""The contract between the FMUs, and whether a given FMU meets it, point by point, as far as it can be read.
 
 It is written here independently of our own modules, because it is what a foreign FMU has to meet;
-a test holds our modules against it.
+a test holds our modules against it. Whether an FMU does what its variables promise: `orchestrator.landing.trial`.
 """
 
 from __future__ import annotations
@@ -140,7 +140,24 @@ CONTACT = (
     _scalar("impulse", "output", "N.s", False, INSIDE),
     _scalar("touch_time", "output", "s", False, INSIDE),
 )
-CONTRACTS = {"robot": ROBOT, "cable": CABLE, "contact": CONTACT}
+CONTROLLER = (
+    _scalar("thrust", "output", "N", use="along z_B, into the robot's input of that name"),
+    Point("torque", "output", "N.m", False, use="to turn the robot, components in B"),
+    Point("body.position", "input", "m", False, use="where the robot is"),
+    Point("body.velocity", "input", "m/s", False, use="how fast it goes"),
+    Point("body.angular_velocity", "input", "rad/s", False, use="how fast it turns"),
+    _scalar("roll", "input", "rad", False, "how it is turned"),
+    _scalar("pitch", "input", "rad", False, "how it is turned"),
+    _scalar("yaw", "input", "rad", False, "how it is turned"),
+    _scalar("contact[k].normal_force", "input", "N", False, "to feel the line"),
+    _scalar("sample_time", "parameter", "s", False, "if it samples: macro steps have to divide it"),
+)
+"""Of its inputs it has those that it needs: any output of the robot by its name, any of contact k as ``contact[k].NAME``."""
+CONTRACTS = {"robot": ROBOT, "cable": CABLE, "contact": CONTACT, "controller": CONTROLLER}
+ANY = "any"
+"""What has no contract: it can be put on trial all the same (`orchestrator.landing.trial`)."""
+FEWEST = 2
+"""Variables that an FMU shares at least with the contract that it is held against; one may be so named by chance."""
 MOST_PORTS = 4
 BREAKS = ("missing", "wrong")
 """Verdicts with which a landing cannot run."""
@@ -153,7 +170,7 @@ def is_control(name: str) -> bool:
 
 def is_unused(name: str, wheels: int) -> bool:
     """Return whether a variable is that of a port beyond the last of the `wheels`."""
-    number = re.match(r"(?:port|wheel)\[(\d+)\]", name)
+    number = re.match(r"(?:port|wheel|contact)\[(\d+)\]", name)
     return bool(number and 0 < wheels < int(number[1]))
 
 
@@ -171,19 +188,26 @@ def check_fmu(path: Path, kind: str | None = None) -> tuple[str, list[Finding]]:
 
     Parameters
     ----------
-    kind : ``robot``, ``cable`` or ``contact``; without it the contract that the FMU's variables suit best
+    kind : ``robot``, ``cable``, ``contact``, ``controller`` or ``any``; without it the contract that its variables suit best
     """
     description = vocabulary.description(path)
     known = vocabulary.of_fmu(path)
     kind = kind or best_contract(known)
-    if kind not in CONTRACTS:
-        raise InputError(f"{kind}: no such contract; choose one of {', '.join(CONTRACTS)}")
-    return kind, [*_capabilities(path, description), *check_variables(kind, known)]
+    if kind not in (*CONTRACTS, ANY):
+        raise InputError(f"{kind}: no such contract; choose one of {', '.join(CONTRACTS)}, {ANY}")
+    points = [] if kind == ANY else check_variables(kind, known)
+    return kind, [*_capabilities(path, description), *points]
 
 
 def best_contract(known: dict[str, Variable]) -> str:
-    """Return the contract of which `known` has the most variables."""
-    return max(CONTRACTS, key=lambda kind: sum(n in known for p in CONTRACTS[kind] for n in p.names(1)))
+    """Return the contract of which `known` has the most variables, each an input, output or parameter as there; or `ANY`."""
+
+    def alike(kind: str) -> int:
+        names = ((n, p.causality) for p in CONTRACTS[kind] for n in p.names(1))
+        return sum(n in known and known[n].causality == causality for n, causality in names)
+
+    best = max(CONTRACTS, key=alike)
+    return best if alike(best) >= FEWEST else ANY
 
 
 def check_variables(kind: str, known: dict[str, Variable]) -> list[Finding]:

@@ -3,11 +3,18 @@
 from __future__ import annotations
 
 from collections.abc import Mapping, Sequence
+from functools import reduce
 
 import numpy as np
 
 from fmus.cable.mesh import spread
 from fmus.cable.module import N_NODES, N_SHAPE
+from orchestrator.coupling.run.columns import Columns
+
+IN_MEMORY = 2**24
+"""Bytes of fields that are made of a table that is on disk."""
+SHAPES = ("cable.shape[", "cable.node[")
+"""Begin the names of signals that are fields, and no columns of a table."""
 
 
 def cable_fields(
@@ -24,10 +31,20 @@ def cable_fields(
     Returns
     -------
     time (n,) s, arc_length (m,) m, position (n, m, 3) m, tension (n, m) N; of our own cable also node_arc_length (j,) m,
-    node_position (n, j, 3) m and node_slope (n, j, 3), dr/ds: the line is cubic between the nodes (Hermite)
+    node_position (n, j, 3) m and node_slope (n, j, 3), dr/ds: the line is cubic between the nodes (Hermite).
+
+    Of a long run, whose table is on disk, these are at every k-th of its N times, and tension_max (N,) N is the largest
+    tension along the line at all of them.
     """
     if "cable.shape[1].position.x" not in table:
         return {}
+    if isinstance(table, Columns):
+        few = _thinned(table)
+        fields = cable_fields(few, length, nodes)
+        if len(few["time"]) < len(table.rows):
+            tensions = (table[f"cable.shape[{i}].tension"] for i in range(1, N_SHAPE + 1))
+            fields["tension_max"] = reduce(np.maximum, tensions)
+        return fields
     shape = [f"cable.shape[{i}]" for i in range(1, N_SHAPE + 1)]
     return {
         "time": np.asarray(table["time"]),
@@ -36,6 +53,18 @@ def cable_fields(
         "tension": np.stack([table[f"{point}.tension"] for point in shape], axis=1),
         **(_nodes(table, nodes) if nodes is not None and "cable.node[1].slope.x" in table else {}),
     }
+
+
+def tension_of(fields: Mapping[str, np.ndarray]) -> np.ndarray | None:
+    """Return the tension along the line at all times (n, m) N, of a long run the largest (n,); None where it is not known."""
+    return fields.get("tension_max", fields.get("tension"))
+
+
+def _thinned(table: Columns) -> dict[str, np.ndarray]:
+    """Return what fields are made of at so few times that they have a place in memory."""
+    names = ["time", *(name for name in table if name.startswith(SHAPES))]
+    step = -(-len(table.rows) * len(names) * 8 // IN_MEMORY)
+    return {name: table[name][::step].copy() for name in names}
 
 
 def _nodes(table: Mapping[str, np.ndarray], nodes: np.ndarray) -> dict[str, np.ndarray]:

@@ -14,17 +14,21 @@ import numpy as np
 from fmus.cable.mesh import TOLERANCE
 from fmus.cable.module import Cable
 from fmus.contact.module import Contact
+from fmus.module import registry
+from fmus.module.recipe import Module
 from fmus.module.variables import ModuleError, Value, Variable, VariableTable
 from fmus.robot.module import Robot
 from orchestrator.catalogue import modules as vocabulary
 from orchestrator.catalogue.robot_spec import RobotSpec, load_robot
 from orchestrator.coupling.course import Course
-from orchestrator.coupling.errors import InputError
+from orchestrator.coupling.errors import InputError, RunError
+from orchestrator.coupling.fmu.failure import FmuError
 from orchestrator.coupling.fmu.instance import Fmu
 from orchestrator.landing.contract import BREAKS, check_variables
 from orchestrator.landing.line_state import Rest, parameters_now, rest_of
 from orchestrator.landing.mesh import Mesh, mesh_of
 from orchestrator.landing.placement import Placement, place, wheels_along
+from orchestrator.scenario.isolation import isolation
 from orchestrator.scenario.over_time import courses, held
 from orchestrator.scenario.types import LandingScenario
 
@@ -33,6 +37,12 @@ MOST_WHEELS = 4
 MESH_TOLERANCE = "mesh_tolerance"
 FOR_THE_MESH = 0.5
 """Part of a tolerance that is left to the mesh."""
+SAMPLE_TIME = "sample_time"
+"""Parameter of a controller that samples, s."""
+WHOLE = 1e-9
+"""Relative; how far the sample time by the macro step may be from a whole number."""
+FLOWN = ("mass", "gravity", "inertia.xx", "inertia.yy", "inertia.zz")
+"""Parameters of the robot that a controller is given where it has them."""
 MESH_KEYS = ("n_elements", "grading", "grading_position")
 """Parameters of the cable that give its mesh; without n_elements it is found from where the wheels land."""
 
@@ -44,7 +54,7 @@ class Sources:
     Attributes
     ----------
     spec : the robot of the catalogue; None for a foreign one
-    variables : of cable, robot and contact, as a foreign FMU's model description or our table has them
+    variables : of cable, robot, contact and controller, as a foreign FMU's model description or our table has them
     n_wheels : of the robot
     mounts : where a foreign robot has its wheels, if it says so by its outputs alone
     line : parameters of the cable that follow from the state of the line
@@ -59,7 +69,7 @@ class Sources:
 
 @dataclass(frozen=True)
 class Part:
-    """Cable, robot or contact of a landing.
+    """Cable, robot, contact or controller of a landing.
 
     Attributes
     ----------
@@ -86,6 +96,7 @@ class Landing:
     contact : of every wheel; the arc length under it is in `placement`
     placement : the start of the robot, and the arc length under each wheel
     mesh, rest : of our cable, the latter before the robot comes; None of a foreign one
+    controller : what flies the robot; None where nothing does
     """
 
     scenario: LandingScenario
@@ -96,6 +107,7 @@ class Landing:
     cable: Part
     robot: Part
     contact: Part
+    controller: Part | None = None
 
     @property
     def n_wheels(self) -> int:
@@ -140,12 +152,15 @@ def _read(scenario: LandingScenario) -> Sources:
     n_wheels = spec.n_wheels if spec is not None else _wheels_of(foreign["robot"], known["robot"])
     tables = {"cable": Cable.table, "robot": Robot(n_wheels).table, "contact": Contact.table}
     ours = {name: {v.name: v for v in table.variables} for name, table in tables.items()}
+    if scenario.controller is not None and scenario.controller.model is not None:
+        ours["controller"] = vocabulary.of_module(scenario.controller.model)
     return Sources(spec, ours | known, n_wheels)
 
 
 def _foreign(scenario: LandingScenario) -> dict[str, Path]:
     """Return the foreign FMUs of the scenario by component."""
     files = {"cable": scenario.cable.fmu, "robot": scenario.robot.fmu, "contact": scenario.contact.fmu}
+    files["controller"] = scenario.controller.fmu if scenario.controller is not None else None
     return {name: Path(file) for name, file in files.items() if file is not None}
 
 
@@ -172,14 +187,14 @@ def _mounts(scenario: LandingScenario, sources: Sources) -> dict[str, Value]:
     known = sources.variables["robot"]
     if scenario.robot.fmu is None or all(f"wheel[{k}].mount.x" in known for k in wheels):
         return {}
-    fmu = Fmu(scenario.robot.fmu, "robot")
     try:
-        fmu.set_parameters(scenario.robot.parameters)
-        fmu.enter_initialization(0.0)
-        fmu.exit_initialization()  # many FMUs know their outputs only now
-        return {f"wheel[{k}].mount.{axis}": _arm(fmu, k, axis) for k in wheels for axis in "xyz"}
-    finally:
-        fmu.close()
+        with Fmu(scenario.robot.fmu, "robot", isolate=isolation(scenario.robot, scenario.simulation)) as fmu:
+            fmu.set_parameters(scenario.robot.parameters)
+            fmu.enter_initialization(0.0)
+            fmu.exit_initialization()  # many FMUs know their outputs only now
+            return {f"wheel[{k}].mount.{axis}": _arm(fmu, k, axis) for k in wheels for axis in "xyz"}
+    except FmuError as error:
+        raise RunError(str(error), error.time) from None
 
 
 def _arm(fmu: Fmu, k: int, axis: str) -> float:
@@ -197,7 +212,8 @@ def _landing(
     settings = dict(scenario.robot.parameters) | initial | held(scenario.robot.inputs)
     robot = replace(robot, settings=settings, module=dict(robot.module) | placement.initial)
     cable, contact = _cable(scenario, sources), _contact(scenario, sources)
-    return Landing(scenario, sources, placement, mesh, rest, cable, robot, contact)
+    controller = _controller(scenario, sources, robot)
+    return Landing(scenario, sources, placement, mesh, rest, cable, robot, contact, controller)
 
 
 def _cable(scenario: LandingScenario, sources: Sources) -> Part:
@@ -240,6 +256,34 @@ def _contact(scenario: LandingScenario, sources: Sources) -> Part:
     stated = sources.spec.contact_parameters if sources.spec is not None else {}
     settings = stated | section.parameters
     return Part(_path(section.fmu), 1, settings, settings)
+
+
+def _controller(scenario: LandingScenario, sources: Sources, robot: Part) -> Part | None:
+    """Return what flies the robot: it knows the robot's mass, inertia and rotors, where it has parameters of these names."""
+    section = scenario.controller
+    if section is None:
+        return None
+    known, module = sources.variables["controller"], robot_module(robot, sources.n_wheels)
+    flown = {name: float(module.values[module.table.index[name]]) for name in FLOWN}
+    if sources.spec is not None and sources.spec.rotors is not None:
+        flown["max_thrust"] = sources.spec.rotors.max_thrust.value
+    settings = {name: value for name, value in flown.items() if name in known} | section.parameters
+    part = Part(_path(section.fmu), 1, settings, settings)
+    _require_instants(scenario, part, known)
+    return part
+
+
+def _require_instants(scenario: LandingScenario, controller: Part, known: Variables) -> None:
+    """Raise `InputError` where macro steps do not end at every sampling instant: coupled and monolithic would fly otherwise."""
+    given = controller.settings.get(SAMPLE_TIME, known[SAMPLE_TIME].start if SAMPLE_TIME in known else 0.0)
+    period, step = float(given or 0.0), scenario.simulation.macro_step
+    count = max(1.0, round(period / step))
+    if period > 0.0 and abs(period / step - count) > WHOLE * count:
+        raise InputError(
+            f"{scenario.path}: simulation.macro_step: {step:g} s does not divide the controller's {SAMPLE_TIME}, "
+            f"{period:g} s: it would sample at other times than it says; {period / count:g} s does, or give "
+            f"controller.parameters.{SAMPLE_TIME}"
+        )
 
 
 def _path(file: str | None) -> Path | None:
@@ -300,6 +344,15 @@ def contact_module(part: Part, s: float) -> Contact:
     contact = Contact()
     _assign(contact.table, contact.values, {**part.module, "initial.s": s})
     return contact
+
+
+def controller_module(landing: Landing) -> Module:
+    """Return the module that flies the robot of a landing; it is not initialised."""
+    section, part = landing.scenario.controller, landing.controller
+    assert section is not None and section.model is not None and part is not None
+    module = registry.find(section.model).recipe().make_module()
+    module.table.assign(module.values, part.module)
+    return module
 
 
 def _assign(table: VariableTable, values: np.ndarray, settings: Mapping[str, Value]) -> None:

@@ -109,6 +109,7 @@ class Safety:
     not_judged : limit → why not
     faults : why it is not safe whatever the limits say: the robot fell off, the run did not come to its end
     touched, airborne : whether a wheel has touched the line; whether none does at the end
+    apart : s between the points that were judged, where these are not all communication points; else 0
     """
 
     until: float
@@ -117,6 +118,7 @@ class Safety:
     faults: Sequence[str] = ()
     touched: bool = True
     airborne: bool = False
+    apart: float = 0.0
 
     @property
     def safe(self) -> bool | None:
@@ -132,7 +134,7 @@ class Safety:
     @property
     def words(self) -> str:
         """The verdict in a line: what it covers, and up to when."""
-        until = f"until {digits(self.until)} s"
+        until = f"until {digits(self.until)} s" + (f", at points {digits(self.apart)} s apart" if self.apart else "")
         if self.safe:
             end = "; in the air at the end" if self.airborne else ""
             return f"SAFE {until}: {', '.join(self.limits)} kept{end}"
@@ -166,7 +168,7 @@ def judge(
     Parameters
     ----------
     table : signals at the communication points
-    tension : (n, m) N along the cable, if it is known beside that at supports and midspan
+    tension : (n, m) N along the cable, or (n,) the largest, if it is known beside that at supports and midspan
     errors : estimated error of signals, in their units
     fault : why the run ended before its time
     """
@@ -296,7 +298,7 @@ def _tension(table: Table, strength: float, along: np.ndarray | None) -> Series:
         raise NotRecorded(TENSIONS[0])
     largest = np.max(known, axis=0)
     if along is not None and len(along) == len(largest):
-        largest = np.maximum(largest, np.max(along, axis=1))
+        largest = np.maximum(largest, along if along.ndim == 1 else np.max(along, axis=1))
     return {None: largest / strength}
 
 

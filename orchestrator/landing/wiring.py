@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+import re
 from collections.abc import Iterator, Mapping
 from pathlib import Path
 
@@ -22,7 +23,10 @@ from orchestrator.coupling.graph.links import Connection
 from orchestrator.coupling.graph.supply import Missing, Supply
 from orchestrator.coupling.masters.options import master_options
 from orchestrator.landing.resolve import Landing
+from orchestrator.scenario.isolation import isolation
 
+CONTROLLER = "controller"
+"""Component that flies the robot."""
 TIGHTEST, LOOSEST = 1e-12, 1e-9
 """m; range of the tolerance of Newton's method in a landing."""
 TOLERANCE = 1e-6
@@ -38,18 +42,25 @@ def landing_graph(landing: Landing, exchange: str) -> Graph:
     `waveform` becomes `hermite` where a contact does not get all means, `point` where a load's slope is not taken.
     """
     components: dict[str, Fmu] = {}
-    files = _files(landing)
+    files, scenario = _files(landing), landing.scenario
+    parts = {"cable": scenario.cable, "robot": scenario.robot, "contact": scenario.contact}
+    if scenario.controller is not None:
+        parts[CONTROLLER] = scenario.controller
+    apart = {name: isolation(section, scenario.simulation) for name, section in parts.items()}
     try:
-        components["cable"] = instance(files["cable"], "cable", landing.cable.steps)
+        components["cable"] = instance(files["cable"], "cable", landing.cable.steps, isolate=apart["cable"])
         inner = (
             {} if landing.cable.foreign is not None else {"integration_step": inner_step(landing, EXCHANGES[exchange])}
         )
         components["cable"].set_parameters(inner | dict(landing.cable.settings))
-        components["robot"] = instance(files["robot"], "robot", landing.robot.steps)
+        components["robot"] = instance(files["robot"], "robot", landing.robot.steps, isolate=apart["robot"])
         components["robot"].set_parameters(landing.robot.settings)
         for k, s in enumerate(landing.placement.arc_lengths, start=1):
-            components[f"contact{k}"] = Fmu(files["contact"], f"contact{k}")
+            components[f"contact{k}"] = Fmu(files["contact"], f"contact{k}", isolate=apart["contact"])
             components[f"contact{k}"].set_parameters({**landing.contact.settings, "initial.s": s})
+        if landing.controller is not None:
+            components[CONTROLLER] = Fmu(files[CONTROLLER], CONTROLLER, isolate=apart[CONTROLLER])
+            components[CONTROLLER].set_parameters(landing.controller.settings)
         for fmu in components.values():  # the contract says so, whether or not a unit does
             fmu.declare(name for name in fmu.ports if is_slope_of_load(name))
         possible = _possible(EXCHANGES[exchange], components)
@@ -64,12 +75,17 @@ def landing_graph(landing: Landing, exchange: str) -> Graph:
 
 
 def _files(landing: Landing) -> dict[str, Path]:
-    """Return the FMUs of cable, robot and contact; those of ours that are missing are built side by side."""
+    """Return the FMUs of cable, robot, contact and controller; those of ours that are missing are built side by side."""
     parts, spec = {"cable": landing.cable, "robot": landing.robot, "contact": landing.contact}, landing.sources.spec
+    if landing.controller is not None:
+        parts[CONTROLLER] = landing.controller
     foreign = {name: part.foreign for name, part in parts.items() if part.foreign is not None}
     ours = {name: library.module_recipe(name) for name in ("cable", "contact") if name not in foreign}
     if spec is not None:
         ours["robot"] = library.robot_recipe(spec)
+    section = landing.scenario.controller
+    if section is not None and section.model is not None:
+        ours[CONTROLLER] = library.module_recipe(section.model)
     return foreign | dict(zip(ours, library.kept(ours.values()), strict=True))
 
 
@@ -121,7 +137,21 @@ def _connections(components: Mapping[str, Fmu]) -> list[Connection]:
         k = name.removeprefix("contact")
         for side, partner in (("cable", f"cable.port[{k}]"), ("wheel", f"robot.wheel[{k}]")):
             found += _links(components, f"{name}.{side}", partner)
-    return found
+    return [*found, *(_flight(components) if CONTROLLER in components else ())]
+
+
+def _flight(components: Mapping[str, Fmu]) -> Iterator[Connection]:
+    """Yield the connections of the controller: with the robot by names, from contact k as ``contact[k].NAME``."""
+    robot = components["robot"].ports
+    for name, variable in components[CONTROLLER].ports.items():
+        there, of = "robot", name
+        if felt := re.fullmatch(r"contact\[(\d+)\]\.(.+)", name):
+            there, of = f"contact{felt[1]}", felt[2]
+        ports = components[there].ports if there in components else {}
+        if variable.causality == "input" and of in ports and ports[of].causality == "output":
+            yield Connection(f"{there}.{of}", f"{CONTROLLER}.{name}")
+        elif variable.causality == "output" and name in robot and robot[name].causality == "input":
+            yield Connection(f"{CONTROLLER}.{name}", f"robot.{name}")
 
 
 def _kept(connections: list[Connection], exchange: Exchange) -> list[Connection]:

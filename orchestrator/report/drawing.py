@@ -8,8 +8,10 @@ from typing import Any
 
 from orchestrator.coupling.errors import InputError
 from orchestrator.coupling.run.results import Table
+from orchestrator.landing.fields import tension_of
 from orchestrator.landing.flight import flight
 from orchestrator.report.signals import panels_for
+from orchestrator.report.thinned import left_out, thinned
 from orchestrator.runs.compare import Comparison
 from orchestrator.runs.files import read_comparison, read_run
 from orchestrator.runs.result import Run
@@ -60,11 +62,18 @@ def run_folders(directory: Path) -> list[Path]:
 
 def draw_run(directory: Path, run: Run, reference: Table | None = None) -> Iterator[Path]:
     """Draw the pictures of one run into ``plots``; yield each when it is there."""
-    from orchestrator.report import plots
+    from orchestrator.report import style
 
     if len(run.time) < 2:
         return
-    folder = directory / "plots"
+    shown = thinned(run)
+    with style.noted(left_out(shown, run)):
+        yield from _drawn(directory / "plots", shown, reference)
+
+
+def _drawn(folder: Path, run: Run, reference: Table | None) -> Iterator[Path]:
+    from orchestrator.report import plots
+
     if len(run.table) > 1:
         yield _overview(folder, run, reference)
     plots.iterations(folder / "iterations.png", {legend(run): run.iterations})
@@ -117,7 +126,7 @@ def _limits(folder: Path, run: Run) -> Iterator[Path]:
     from orchestrator.report.limits import limits
 
     if run.limits:
-        limits(folder / "limits.png", run.limits, run.table, run.fields.get("tension"))
+        limits(folder / "limits.png", run.limits, run.table, tension_of(run.fields))
         yield folder / "limits.png"
 
 

@@ -29,7 +29,7 @@ def limits(path: Path, judged: Mapping[str, Judged], run: Table, tension: np.nda
     ----------
     judged : limits by name
     run : signals at the communication points
-    tension : (n, m) N along the cable
+    tension : (n, m) N along the cable, or (n,) the largest
     """
     with saved(path, (6.4, 1.35 * len(judged) + 0.6)) as figure:
         axes = figure.subplots(len(judged), 1, sharex=True, squeeze=False)[:, 0]

@@ -109,8 +109,8 @@ LANDING = (
     _Kind("Angle", r"robot\.(roll|pitch|yaw)", "°", DEGREES, "rad"),
     _Kind("Sum of wall forces", r"contact(\d+)\.normal_force", "N", 1.0, "N", "wheel {}", peaks=True),
     _Kind("Cable tension", r"cable\.tension_()mid", "kN", 1e-3, "N"),
-    _Kind("Thrust", r"robot\.()thrust", "N", 1.0, "N", if_it_varies=True),
-    _Kind("Torque", r"robot\.torque\.([xyz])", "N m", 1.0, "N.m", "about {}", if_it_varies=True),
+    _Kind("Thrust", r"(?:robot|controller)\.()thrust", "N", 1.0, "N", if_it_varies=True),
+    _Kind("Torque", r"(?:robot|controller)\.torque\.([xyz])", "N m", 1.0, "N.m", "about {}", if_it_varies=True),
     _Kind("Drive torque", r"robot\.wheel\[(\d+)\]\.drive_torque", "N m", 1.0, "N.m", "wheel {}", if_it_varies=True),
 )
 
@@ -132,7 +132,7 @@ def panels_for(
 def _of_kind(kind: _Kind, table: Table) -> Panel:
     found = {n: kind.words.format(m[1]) if m[1] else "" for n in table if (m := re.fullmatch(kind.pattern, n))}
     if kind.if_it_varies:
-        found = {name: words for name, words in found.items() if np.ptp(table[name]) > 0.0}
+        found = {name: words for name, words in found.items() if np.ptp(shown(table[name], kind.own_unit)) > 0.0}
     lines = found if len(found) > 1 else dict.fromkeys(found, "")
     return Panel(kind.label, kind.unit, lines, kind.factor, kind.own_unit, kind.from_start, kind.peaks)
 

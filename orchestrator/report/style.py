@@ -4,6 +4,7 @@ from __future__ import annotations
 
 from collections.abc import Iterator, Sequence
 from contextlib import contextmanager, suppress
+from contextvars import ContextVar
 from pathlib import Path
 from typing import Any
 
@@ -50,6 +51,17 @@ STYLE: dict[Any, Any] = {
 }
 LEAST_RANGE = 1e-4
 """Part of the largest value that an axis shows at least: what moves less stands still."""
+_note: ContextVar[str] = ContextVar("note", default="")
+
+
+@contextmanager
+def noted(text: str) -> Iterator[None]:
+    """Let each figure saved within say `text` in its lower corner."""
+    before = _note.set(text)
+    try:
+        yield
+    finally:
+        _note.reset(before)
 
 
 @contextmanager
@@ -59,7 +71,9 @@ def saved(path: Path, size: tuple[float, float], dpi: float | None = None) -> It
         figure = Figure(figsize=size)
         FigureCanvasAgg(figure)  # draws without a display, and measures what is drawn
         yield figure
-        with suppress(OverflowError), replacing(path) as temporary:
+        if text := _note.get():
+            figure.text(0.995, 0.005, text, ha="right", va="bottom", fontsize=5, color=GREY)
+        with suppress(OverflowError), replacing(path, lasting=False) as temporary:
             figure.savefig(temporary, dpi=dpi or STYLE["savefig.dpi"])
 
 
@@ -129,6 +143,6 @@ def save_figure(figure: Figure, place: Path) -> list[Path]:
     """Write a figure as PNG, and as PDF for a paper; return the paths: `place` with their endings."""
     paths = [place.with_suffix(f".{kind}") for kind in ("png", "pdf")]
     for path in paths:
-        with replacing(path) as temporary, matplotlib.rc_context(STYLE):
+        with replacing(path, lasting=False) as temporary, matplotlib.rc_context(STYLE):
             figure.savefig(temporary, dpi=STYLE["savefig.dpi"])
     return paths

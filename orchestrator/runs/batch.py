@@ -25,7 +25,7 @@ from pebble import ProcessExpired, ProcessPool
 from fmus.face.first_use import compile_modules
 from fmus.kernels.jit import is_compiled
 from orchestrator.coupling.errors import InputError
-from orchestrator.runs import cluster, worker
+from orchestrator.runs import cluster, last_net, worker
 from orchestrator.runs.job import Done, Job, code_version, found, make, remove_half_done
 from orchestrator.scenario.types import LandingScenario
 
@@ -148,7 +148,7 @@ class Batches:
             return
         pool = self._started(solvers)
         futures: dict[Future[None], str] = {
-            pool.schedule(make, args=(job, self.store), timeout=limit): key for key, job in left.items()
+            pool.schedule(worker.guarded, args=(make, job, self.store), timeout=limit): key for key, job in left.items()
         }
         for future in as_completed(futures):
             yield futures[future], future
@@ -214,6 +214,9 @@ def _failure(error: BaseException | None) -> str | None:
             return f"its process died (exit code {error.exitcode}); run the scenario alone to see why"
         case cluster.LostError():
             return str(error)
+        case last_net.InternalError():
+            last_net.noted.append(str(error))
+            return str(error)
         case OSError() if error.errno in NO_ROOM:
             raise error
         case _:  # whatever it is, it is that run's alone
@@ -260,6 +263,6 @@ def _batches() -> Batches:
         current_process().daemon = (
             False  # Dask's workers are daemons, which may have no children; this one ends with it
         )
-        _here.folder = tempfile.TemporaryDirectory(prefix="line-landing-")
+        _here.folder = tempfile.TemporaryDirectory(prefix=f"line-landing-{os.getpid()}-")
         _here.batches = Batches(Path(_here.folder.name), 1)
     return _here.batches

@@ -155,7 +155,10 @@ class Comparison:
     @property
     def exit_status(self) -> int:
         """The exit status of ``orchestrator compare``: 0 within and not unsafe, 1 missed or not safe, 3 failed, 130
-        interrupted."""
+        interrupted (128 + the number of the signal)."""
+        signalled = [run.exit_status for run in self.results if run.verdict == "interrupted"]
+        if self.verdict == "interrupted" and signalled:
+            return signalled[-1]
         return MISSED if self.verdict == "within" and self.safe is False else EXIT_STATUS[self.verdict]
 
     @property

@@ -16,7 +16,8 @@ from typing import Any
 import numpy as np
 
 from orchestrator.coupling.errors import InputError
-from orchestrator.coupling.run.results import replacing, write_fields, write_json, write_table
+from orchestrator.coupling.run.results import write_bytes, write_fields, write_json, write_table
+from orchestrator.runs.going_on import conclude, let_go
 
 PACKAGES = ("line-landing", "numpy", "scipy", "numba", "fmpy", "pythonfmu")
 
@@ -46,6 +47,19 @@ class RunDirectory:
             raise InputError(f"{path}: cannot be made: {error.strerror}; choose another with --out") from None
 
     @classmethod
+    def within(cls, parent: RunDirectory, name: str) -> RunDirectory:
+        """Return a folder in one of our own, made if need be."""
+        (parent.path / name).mkdir(exist_ok=True)
+        return cls.of(parent.path / name)
+
+    @classmethod
+    def of(cls, path: Path) -> RunDirectory:
+        """Return a directory that is there already, and is to be written to."""
+        found = cls.__new__(cls)
+        found.path = path
+        return found
+
+    @classmethod
     def numbered(cls, name: str, base: Path = Path("runs")) -> RunDirectory:
         """Make ``runs/NAME-001``, or the first higher number that is free; two runs never get the same one."""
         for number in count(1):
@@ -67,12 +81,15 @@ class RunDirectory:
 
     def write_lines(self, name: str, lines: Iterable[str]) -> None:
         """Write `lines` of text."""
-        with replacing(self.path / name) as temporary:
-            temporary.write_text("".join(f"{line}\n" for line in lines), encoding="utf-8")
+        write_bytes(self.path / name, "".join(f"{line}\n" for line in lines).encode())
 
     def write_manifest(self, content: Mapping[str, Any], error: str | None = None) -> None:
-        """Write ``manifest.json``, the last file; with `error` the run is marked as incomplete."""
+        """Write ``manifest.json``, the last file; with `error` the run is marked as incomplete.
+
+        What was kept while the run was going on is not needed any more.
+        """
         self.write_json("manifest.json", manifest(content, error))
+        conclude(self.path)
 
     def discard(self) -> None:
         """Remove the directory if nothing was written: its run did not come to be."""
@@ -93,6 +110,7 @@ def claimed(out: Path | str | None, name: str) -> Iterator[RunDirectory]:
     try:
         yield directory
     finally:
+        let_go(directory.path)
         directory.discard()
 
 

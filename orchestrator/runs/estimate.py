@@ -13,7 +13,9 @@ steps and mesh (docs/concepts/error.md).
 
 from __future__ import annotations
 
+import signal
 from collections.abc import Callable, Sequence
+from pathlib import Path
 from typing import Any
 
 import numpy as np
@@ -122,6 +124,8 @@ def _attempted(coupled: Coupled, part: str, make: Callable[[], Differences | Non
         return make(), True
     except (OrchestratorError, ModuleError) as error:
         coupled.estimate_failure += f"{'; ' if coupled.estimate_failure else ''}{NAMES[part]}: {error}"
+        if isinstance(error, Interrupted) and error.number != signal.SIGINT:
+            coupled.stopped = error.number
         return dict.fromkeys(coupled.judged, float("nan")), not isinstance(error, Interrupted)
 
 
@@ -134,7 +138,7 @@ def _parts(values: Sequence[float | None]) -> Parts:
 
 
 def _of_coupling(coupled: Coupled, again: System, kept: Kept, progress: Reached) -> Differences:
-    other = completed(again, progress)
+    other = completed(again, progress, _place(coupled, "coupling"))
     kept.append(other)
     return _scaled(coupled.table, other.table, coupled.judged, factor(coupled.scenario, coupled.exchange))
 
@@ -149,7 +153,9 @@ def _of_inner_steps(coupled: Coupled, second_run: Kept, found: Found, progress: 
         small = _where_small(coupled, again, second_run[0], found, steps, progress)
         if small is not None:
             return small
-    return _scaled(coupled.table, completed(again, progress).table, coupled.judged, OF_INNER_STEPS)
+    return _scaled(
+        coupled.table, completed(again, progress, _place(coupled, "inner_steps")).table, coupled.judged, OF_INNER_STEPS
+    )
 
 
 def _where_small(
@@ -190,9 +196,15 @@ def _of_mesh(coupled: Coupled, progress: Reached) -> Differences | None:
         return None
     by = left_out(finer.ratio)
     if system.problem() is None or finer.system.problem() is None:
-        return _scaled(coupled.table, completed(finer.system, progress).table, coupled.judged, by)
+        table = completed(finer.system, progress, _place(coupled, "mesh")).table
+        return _scaled(coupled.table, table, coupled.judged, by)
     own, fine = (solved(one, coupled.table["time"], progress) for one in (system, finer.system))
     return _scaled(own, fine, coupled.judged, by)
+
+
+def _place(coupled: Coupled, part: str) -> Path | None:
+    """Return where the run for a part is kept while it is needed."""
+    return coupled.folder / part if coupled.folder is not None else None
 
 
 def solved(system: System, times: np.ndarray, progress: Reached, tolerance: float = MESH_TOLERANCE) -> Table:
@@ -205,7 +217,7 @@ def solved(system: System, times: np.ndarray, progress: Reached, tolerance: floa
         with interruptible() as check:
             found = monolithic.solve(problem, times, tolerance, estimate=False, progress=_both(progress, check))
     except Interruption as error:
-        raise Interrupted(str(error), error.time) from None
+        raise Interrupted(str(error), error.time, error.number) from None
     except ModuleError as error:
         raise RunError(str(error)) from None
     return {"time": found.time, **found.signals}

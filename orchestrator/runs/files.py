@@ -8,19 +8,21 @@ from __future__ import annotations
 from collections.abc import Callable, Sequence
 from dataclasses import dataclass, replace
 from pathlib import Path
-from typing import Any
+from typing import Any, TypeVar
 
 import numpy as np
 
-from orchestrator.coupling.errors import InputError
+from orchestrator.coupling.errors import InputError, OrchestratorError
+from orchestrator.coupling.run.columns import Columns
 from orchestrator.coupling.run.results import Table, plain, read_fields, read_json, read_table
 from orchestrator.runs.compare import Comparison
 from orchestrator.runs.directory import RunDirectory, manifest
+from orchestrator.runs.going_on import FOLDER, keep_signals
 from orchestrator.runs.result import Run
 
 FIELD_UNITS = {
     "time": "s", "arc_length": "m", "position": "m", "tension": "N",
-    "node_arc_length": "m", "node_position": "m", "node_slope": "1",
+    "node_arc_length": "m", "node_position": "m", "node_slope": "1", "tension_max": "N",
 }  # fmt: skip
 COUNTS = {"iterations": int, "subdivisions": int, "rejected": int, "columns": int, "by_model": bool, "converged": bool}
 """Columns of ``iterations.csv`` that are no real numbers."""
@@ -69,7 +71,7 @@ def write_unfinished(directory: RunDirectory, runs: Sequence[Run], error: str, v
 
 
 def _write_runs(directory: RunDirectory, runs: Sequence[Run], views: Views, error: str | None) -> list[Run]:
-    folders = [RunDirectory(directory.path / run.label) for run in runs]
+    folders = [RunDirectory.within(directory, run.label) for run in runs]
     for folder, run in zip(folders, runs, strict=True):
         _write_tables(folder, run)
     notes = _viewed(directory, runs[0], error, views)
@@ -83,6 +85,8 @@ def _write_tables(directory: RunDirectory, run: Run) -> None:
     directory.write_table("iterations.csv", run.iterations)
     if run.fields:
         directory.write_fields("fields.h5", run.fields, FIELD_UNITS)
+    if "tension_max" in run.fields:  # the shapes at some times; all are in this file
+        keep_signals(directory.path)
     if run.messages:
         directory.write_lines(FMU_LOG, run.messages)
     directory.write_json("summary.json", run.summary)
@@ -113,25 +117,55 @@ def _dependencies(run: Run) -> dict[str, Any]:
     return {name: value for name, value in run.manifest.items() if name not in ("complete", "error")}
 
 
+def write_end(directory: RunDirectory, first: Run, error: str, views: Views = NO_VIEWS) -> None:
+    """Write what stands beside the runs of a comparison that has died: page and manifest, with `error`."""
+    directory.write_manifest(_dependencies(first) | _viewed(directory, first, error, views), error)
+
+
 # -- reading --------------------------------------------------------------------------------------------------
 
 
 def load_run(directory: Path | str) -> Run:
     """Return the result of the finished run in `directory`; `InputError` if there is none."""
     require_finished(Path(directory))
-    return read_run(Path(directory))
+    return undamaged(Path(directory), read_run)
 
 
 def load_comparison(directory: Path | str) -> Comparison:
     """Return the finished comparison in `directory`; `InputError` if there is none."""
     require_finished(Path(directory))
-    return read_comparison(Path(directory))
+    return undamaged(Path(directory), read_comparison)
+
+
+Read = TypeVar("Read")
+
+
+def undamaged(directory: Path, read: Callable[[Path], Read]) -> Read:
+    """Return what `read` makes of a directory; `InputError` where it is damaged, whatever that comes to."""
+    try:
+        return read(directory)
+    except OrchestratorError:
+        raise
+    except Exception as error:  # a file of another kind, half a table, a missing key
+        raise InputError(f"{directory}: damaged results ({type(error).__name__}: {error}); run it again") from error
+
+
+def _said(path: Path) -> dict[str, Any]:
+    """Return the content of a JSON file that is a table."""
+    content = read_json(path)
+    if not isinstance(content, dict):
+        raise InputError(f"{path}: holds no table but {type(content).__name__}; run it again")
+    return content
 
 
 def require_finished(directory: Path) -> None:
     """Raise `InputError` where `directory` is not that of a finished run or comparison."""
-    if not (directory / "manifest.json").is_file():
-        raise InputError(f"{directory}: no manifest.json; it is not the directory of a finished run")
+    if (directory / "manifest.json").is_file():
+        return
+    message = f"{directory}: no manifest.json; it is not the directory of a finished run"
+    if (directory / FOLDER).is_dir():
+        message += "; what an unfinished one has left is read by load_unfinished, and drawn by `orchestrator report`"
+    raise InputError(message)
 
 
 def read_run(directory: Path) -> Run:
@@ -141,15 +175,15 @@ def read_run(directory: Path) -> Run:
         read_table(directory / "results.csv"),
         _counted(read_table(directory / "iterations.csv")),
         read_fields(directory / "fields.h5"),
-        read_json(directory / "summary.json"),
-        read_json(manifest) if manifest.is_file() else {},
+        _said(directory / "summary.json"),
+        _said(manifest) if manifest.is_file() else {},
         directory,
         _lines(directory / FMU_LOG),
     )
 
 
 def _lines(path: Path) -> list[str]:
-    return path.read_text(encoding="utf-8").splitlines() if path.is_file() else []
+    return path.read_text(encoding="utf-8", errors="replace").splitlines() if path.is_file() else []
 
 
 def read_comparison(directory: Path) -> Comparison:
@@ -163,4 +197,6 @@ def read_comparison(directory: Path) -> Comparison:
 
 
 def _counted(table: Table) -> Table:
+    if isinstance(table, Columns):
+        return table.of_kinds({name: COUNTS[name] for name in table if name in COUNTS})
     return {name: np.asarray(values, dtype=COUNTS.get(name, float)) for name, values in table.items()}

@@ -10,6 +10,7 @@ import hashlib
 import json
 import os
 import shutil
+import signal
 import time
 from collections.abc import Callable, Iterator, Mapping
 from contextlib import contextmanager
@@ -28,6 +29,7 @@ from orchestrator.catalogue.shelf import is_file
 from orchestrator.coupling.errors import InputError, RunError, nearest
 from orchestrator.coupling.run.interrupt import Interruption
 from orchestrator.coupling.run.results import Table, plain, read_json, read_table
+from orchestrator.coupling.scratch import is_running
 from orchestrator.landing import audit, monolithic
 from orchestrator.runs.coupled import run_coupled
 from orchestrator.runs.directory import RunDirectory
@@ -103,6 +105,8 @@ def _named(scenario: Scenario) -> dict[str, Any]:
     if isinstance(scenario, GraphScenario):
         return {name: _hash(section.fmu) for name, section in scenario.components.items() if section.fmu}
     sections = {"cable": scenario.cable, "robot": scenario.robot, "contact": scenario.contact}
+    if scenario.controller is not None:
+        sections["controller"] = scenario.controller
     found: dict[str, Any] = {name: _hash(section.fmu) for name, section in sections.items() if section.fmu}
     model = scenario.robot.model
     return found | ({"model": asdict(load_robot(model))} if model is not None and is_file(model) else {})
@@ -200,20 +204,8 @@ def remove_half_done(store: Path) -> None:
     """Remove what runs have left in `store` whose process is no more: it was killed, or the disk was full."""
     for folder in store.glob(".*.*"):
         process = folder.suffix.removeprefix(".")
-        if process.isdecimal() and not _is_running(int(process)):
+        if process.isdecimal() and not is_running(int(process)):
             shutil.rmtree(folder, ignore_errors=True)
-
-
-def _is_running(process: int) -> bool:
-    if os.name != "posix":  # elsewhere to ask is to end it
-        return True
-    try:
-        os.kill(process, 0)
-    except ProcessLookupError:
-        return False
-    except OSError:  # it is another user's, or the system cannot tell
-        return True
-    return True
 
 
 def _manifest(job: Job, scenario: Scenario) -> dict[str, Any]:
@@ -267,7 +259,7 @@ def _monolithic(job: Job, scenario: Scenario) -> Outcome:
 def _coupled(job: Job, scenario: Scenario) -> Outcome:
     coupled = run_coupled(resolve(scenario))
     if isinstance(coupled.log.error, Interruption):
-        raise KeyboardInterrupt
+        signal.raise_signal(coupled.log.error.number)
     if coupled.log.error is not None:
         raise RunError(str(coupled.log.error), coupled.log.error.time)
     _known(job, job.extremes, coupled.table)

@@ -11,7 +11,7 @@ from typing import Any, Literal
 
 import numpy as np
 
-from orchestrator.coupling.errors import DONE, FAILED, FORWARD, INTERRUPTED, MISSED
+from orchestrator.coupling.errors import DONE, FAILED, FORWARD, INTERRUPTED, MISSED, SIGNALLED
 from orchestrator.coupling.run.results import Table
 from orchestrator.landing import audit
 from orchestrator.landing.safety import Judged
@@ -156,7 +156,12 @@ class Run:
 
     @property
     def exit_status(self) -> int:
-        """The exit status of ``orchestrator run``: 0 within and not unsafe, 1 missed or not safe, 3 failed, 130 interrupted."""
+        """The exit status of ``orchestrator run``: 0 within and not unsafe, 1 missed or not safe, 3 failed.
+
+        Of one that a signal has ended it is 128 + the signal's number: 130 after Ctrl-C.
+        """
+        if (number := self.summary.get("signal")) is not None:
+            return SIGNALLED + number
         return MISSED if self.verdict == "within" and self.safe is False else EXIT_STATUS[self.verdict]
 
     @property

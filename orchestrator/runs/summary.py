@@ -41,10 +41,12 @@ def manifest(scenario: Scenario, fmus: Mapping[str, Any]) -> dict[str, Any]:
 def summary(coupled: Coupled) -> dict[str, Any]:
     """Return what ``summary.json`` holds: verdict, cost, convergence, extremes of the signals, interface work."""
     log, scenario, about = coupled.log, coupled.scenario, coupled.system.about(coupled.table)
+    time = coupled.table["time"]
     return {
         "scenario": scenario.name,
         "title": scenario.title,
         "verdict": verdict(coupled),
+        "signal": signal_of(coupled),
         **safety(coupled),
         "notes": scenario.notes,
         "warnings": coupled.system.warnings(coupled.table),
@@ -54,12 +56,14 @@ def summary(coupled: Coupled) -> dict[str, Any]:
         "exchange": coupled.exchange or None,
         "exchange_asked": coupled.system.exchange or coupled.exchange or None,
         "macro_step": log.macro_step,
+        "output_interval": scenario.simulation.output_interval,
         **_cost(coupled),
         "left_the_groove": coupled.fallen,
         "unresolved_impacts": unresolved(coupled),
         "energy": coupled.energy.content() if coupled.energy is not None else about["energy"],
         "interface_work_J": {name: float(work[-1]) for name, work in log.energy.items()},
         "energy_residual_J": {name: float(np.max(np.abs(r))) for name, r in log.energy_residual.items()},
+        "energy_made": energy_made(coupled),
         "tolerances": scenario.simulation.tolerances,
         "estimate": scenario.simulation.estimate,
         "estimated_error": {name: parts.content() for name, parts in coupled.error_parts.items()},
@@ -67,7 +71,7 @@ def summary(coupled: Coupled) -> dict[str, Any]:
         "interface_balance": interface_balance(coupled.table, log.energy),
         "fmu_warnings": {name: m.warnings for name, m in coupled.messages.items() if m.warnings},
         "units": {"time": "s"} | {name: log.units[name] for name in coupled.table if name in log.units},
-        "extremes": {n: extremes(log.time, coupled.table, n) for n in coupled.table if n != "time"},
+        "extremes": {n: extremes(time, coupled.table, n) for n in coupled.table if n != "time"},
     }
 
 
@@ -78,6 +82,12 @@ def verdict(coupled: Coupled) -> Verdict:
     return "missed" if coupled.log.unconverged or coupled.fallen or coupled.misses else "within"
 
 
+def signal_of(coupled: Coupled) -> int | None:
+    """Return the number of the signal that has ended a run, or its estimate; None where none has."""
+    error = coupled.log.error
+    return error.number if isinstance(error, Interruption) else coupled.stopped or None
+
+
 def safety(coupled: Coupled) -> dict[str, Any]:
     """Return what is said of the safety of a landing; of a general graph, that nothing is."""
     error = coupled.log.error
@@ -86,9 +96,23 @@ def safety(coupled: Coupled) -> dict[str, Any]:
     return found.content() if found is not None else dict(NO_LANDING)
 
 
+def energy_made(coupled: Coupled) -> dict[str, Any] | None:
+    """Return what the coupling has made, J: in the end, and at most on the way; None where no load is booked on both sides."""
+    log = coupled.log
+    if not log.energy_residual:
+        return None
+    made = np.cumsum(log.steps.column("energy_made"))
+    return {
+        "end_J": float(made[-1]) if made.size else 0.0,
+        "largest_J": float(np.max(made, initial=0.0)),
+        "loads_booked": len(log.energy_residual),
+        "loads": len(log.energy),
+    }
+
+
 def _cost(coupled: Coupled) -> dict[str, Any]:
     log = coupled.log
-    simulated = float(log.time[-1] - log.time[0])
+    simulated = float(np.ptp(log.time))
     return {
         "simulated_s": simulated,
         "wall_s": log.wall,
@@ -108,10 +132,11 @@ def unresolved(coupled: Coupled) -> list[dict[str, Any]]:
     A macro step that was divided counts as the mean of its parts.
     """
     log, found = coupled.log, dict[str, dict[str, Any]]()
-    steps = log.macro_step / np.array([1.0 + step.subdivisions for step in log.steps])
+    steps = log.macro_step / (1.0 + log.steps.column("subdivisions"))
+    points, row = log.points, log.macro_step * log.every
     for impact in sorted(coupled.system.impacts(coupled.table), key=lambda impact: impact.period):
         rise = 0.25 * impact.period
-        during = (log.time[1:] > impact.time) & (log.time[:-1] < impact.time + log.macro_step + rise)
+        during = (points[1:] > impact.time) & (points[:-1] < impact.time + row + rise)
         longest = float(np.max(steps[during], initial=0.0))
         if longest > rise:
             found.setdefault(impact.contact, {**asdict(impact), "step": longest})

@@ -13,6 +13,7 @@ import numpy as np
 from fmus.cable.mesh import TOLERANCE
 from orchestrator.catalogue import library
 from orchestrator.catalogue import modules as vocabulary
+from orchestrator.catalogue.modules import description
 from orchestrator.coupling.course import Course
 from orchestrator.coupling.errors import digits
 from orchestrator.coupling.exchange import (
@@ -27,24 +28,29 @@ from orchestrator.coupling.exchange import (
     suffixed,
     suited_to,
 )
+from orchestrator.coupling.fmu.description import structure_of
 from orchestrator.coupling.fmu.instance import Fmu
 from orchestrator.coupling.fmu.sub_steps import instance
 from orchestrator.coupling.graph.graph import Graph
 from orchestrator.coupling.graph.links import Connection, owner_of, variable_of
 from orchestrator.coupling.graph.supply import Missing, Supply, chosen
 from orchestrator.coupling.masters import MASTERS
-from orchestrator.coupling.run.results import Table
+from orchestrator.coupling.run.columns import some_of
+from orchestrator.coupling.run.results import Fields, Table
 from orchestrator.landing import audit
 from orchestrator.landing.build import has_monolithic, problem
 from orchestrator.landing.contract import is_control, is_unused
-from orchestrator.landing.fields import cable_fields
+from orchestrator.landing.fields import SHAPES, cable_fields, tension_of
 from orchestrator.landing.geometry import geometry
 from orchestrator.landing.impacts import Impact, impacts
 from orchestrator.landing.limits import limits_of
 from orchestrator.landing.resolve import MESH_KEYS, MESH_TOLERANCE, Landing, Variables
 from orchestrator.landing.resolve import resolve as resolve_landing
 from orchestrator.landing.safety import Limits, Safety, judge
+from orchestrator.landing.trial.remembered import said
 from orchestrator.landing.wiring import inner_step, lacking, landing_graph
+from orchestrator.runs.foreign import departing
+from orchestrator.scenario.isolation import isolation
 from orchestrator.scenario.over_time import courses, held
 from orchestrator.scenario.types import CableSection, Component, GraphScenario, LandingScenario, RobotSection, Scenario
 
@@ -52,7 +58,6 @@ if TYPE_CHECKING:
     from orchestrator.landing.monolithic import Problem
 
 INNER_STEP = "integration_step"
-Fields = dict[str, np.ndarray]
 Stepped = TypeVar("Stepped", CableSection, RobotSection, Component)
 
 
@@ -162,12 +167,21 @@ class LandingSystem:
         """Return another exchange than that asked for, and what nothing feeds; our cable and robot need no more than is fed."""
         contacts = [name for name in graph.components if name.startswith("contact")]
         foreign = {"cable": self.landing.cable.foreign, "robot": self.landing.robot.foreign}
+        if self.landing.controller is not None:
+            foreign["controller"] = self.landing.controller.foreign
         named = [*contacts, *(name for name, file in foreign.items() if file is not None)]
         names = [n for n in graph.unfed if owner_of(n) in named and not is_unused(variable_of(n), len(contacts))]
         lacks = zip(contacts, lacking(graph.components), strict=True)
         fallen = [_fallen_back(name, graph.components[name], self.exchange, what) for name, what in lacks]
         unfed = _unfed([n for n in names if not is_control(variable_of(n))])
-        return [*filter(None, fallen), *unfed, *_means_alone(graph)]
+        return [*filter(None, fallen), *unfed, *_means_alone(graph), *departing(graph, named), *self._untried(graph)]
+
+    def _untried(self, graph: Graph) -> Iterator[str]:
+        """Yield which foreign FMUs have not passed a trial, as far as one is remembered."""
+        parts = {"cable": self.landing.cable, "robot": self.landing.robot, "contact1": self.landing.contact}
+        for name, part in parts.items():
+            if part.foreign is not None:
+                yield from filter(None, [said(graph.components[name].sha256, name.rstrip("1"), part.foreign)])
 
     def problem(self) -> Callable[[], Problem] | None:
         """Return what makes the monolithic problem; None where our modules cannot stand for a foreign FMU."""
@@ -175,7 +189,7 @@ class LandingSystem:
 
     def split(self, table: Table) -> tuple[Fields, Table]:
         """Return the cable's shape and tension over time as arrays, and the table without them."""
-        rest = {name: values for name, values in table.items() if not name.startswith(("cable.shape[", "cable.node["))}
+        rest = some_of(table, [name for name in table if not name.startswith(SHAPES)])
         nodes = self.landing.mesh.nodes if self.landing.mesh is not None else None
         return cable_fields(table, self.landing.placement.cable_length, nodes), rest
 
@@ -212,7 +226,9 @@ class LandingSystem:
         fault: str | None = None,
     ) -> Safety:
         """Return the signals held against the limits; parameters as for `judge`."""
-        return judge(self.limits, table, fields.get("tension"), errors, fault)
+        simulation = self.scenario.simulation
+        apart = (simulation.output_interval or 0.0) if simulation.every > 1 else 0.0
+        return replace(judge(self.limits, table, tension_of(fields), errors, fault), apart=apart)
 
     def changed(self, options: Mapping[str, Any], **simulation: Any) -> LandingSystem:
         """Return it with other options of the master and other simulation settings; the start stays as it is."""
@@ -257,7 +273,9 @@ class GraphSystem:
         try:
             for name, section in self.scenario.components.items():
                 file = section.fmu or library.module_fmu(str(section.model))
-                components[name] = instance(file, name, section.steps, section.continuous)
+                apart = isolation(section, self.scenario.simulation)
+                structure = structure_of(description(Path(file)), section.parameters) if section.fmu else {}
+                components[name] = instance(file, name, section.steps, section.continuous, apart, structure)
             connections = [Connection.parse(text) for text in self.scenario.connections]
             supply = Supply(components, connections)
             for name, section in self.scenario.components.items():
@@ -279,7 +297,8 @@ class GraphSystem:
             if self._follows(name)
         ]
         said = [*filter(None, fallen), *_unfed(graph.unfed), *_means_alone(graph)]
-        return [*said, *self._discrete(graph), *self._below(graph), *_silent(graph)]
+        odd = departing(graph, self._foreign)
+        return [*said, *self._discrete(graph), *self._below(graph), *_silent(graph), *odd]
 
     @property
     def _foreign(self) -> dict[str, Component]:

@@ -18,6 +18,7 @@ import numpy as np
 from fmus.module.variables import ModuleError
 from orchestrator.catalogue import robot_spec
 from orchestrator.coupling.errors import InputError
+from orchestrator.coupling.run.results import write_bytes
 from orchestrator.landing.geometry import geometry
 from orchestrator.landing.limits import pitch_by_mass
 from orchestrator.landing.resolve import resolve
@@ -80,7 +81,7 @@ def leave(directory: RunDirectory, system: System, others: bool = True) -> None:
         about, words = _none(f"{type(error).__name__}: {error}"), None
     directory.write_json(START, about)
     if words is not None:
-        (directory.path / START_BLOCKS).write_bytes(words.astype("<f8").tobytes())
+        write_bytes(directory.path / START_BLOCKS, words.astype("<f8").tobytes())
 
 
 def _none(why: str) -> dict[str, Any]:
@@ -111,6 +112,8 @@ def _why_not(system: LandingSystem) -> str:
 
     if system.problem() is None:
         return "the monolithic solver cannot stand for an FMU of this landing"
+    if system.landing.controller is not None:
+        return "a controller flies this landing, which the solver in the page does not have"
     return why_not(system.landing.robot.courses)
 
 

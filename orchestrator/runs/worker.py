@@ -7,7 +7,7 @@ import os
 import signal
 import sys
 import threading
-from collections.abc import Iterable, Iterator, Mapping
+from collections.abc import Callable, Iterable, Iterator, Mapping
 from contextlib import contextmanager
 from multiprocessing import get_all_start_methods, get_context, parent_process
 from multiprocessing.connection import wait
@@ -17,6 +17,8 @@ from pebble import ProcessPool
 
 from fmus.kernels import notice
 from orchestrator.catalogue.documents import read_once_from_now_on
+from orchestrator.coupling.errors import OrchestratorError
+from orchestrator.runs import last_net
 
 ONE_THREAD = ("OPENBLAS_NUM_THREADS", "OMP_NUM_THREADS", "MKL_NUM_THREADS", "VECLIB_MAXIMUM_THREADS")
 FORKED = "forkserver"
@@ -72,6 +74,16 @@ def begin(environment: Mapping[str, str]) -> None:
     notice.muted = True
     read_once_from_now_on()
     end_with_parent()
+
+
+def guarded(make: Callable[..., None], *arguments: Any) -> None:
+    """Call `make`; a fault of this program leaves its traceback in a file, here where it is known, and comes as its name."""
+    try:
+        make(*arguments)
+    except (OrchestratorError, OSError, MemoryError):
+        raise
+    except Exception as error:
+        raise last_net.caught(error, [f"{make.__name__}{arguments}"]) from None
 
 
 def end_with_parent() -> None:

@@ -16,7 +16,8 @@ from orchestrator.catalogue.documents import Document, table_of
 from orchestrator.catalogue.quantities import Complaint, Scalar
 from orchestrator.coupling.errors import InputError, digits, nearest
 from orchestrator.coupling.masters.options import master_options, out_of_bounds, takes
-from orchestrator.scenario.over_time import OverTime, problems_of
+from orchestrator.coupling.steps import number_of
+from orchestrator.scenario.over_time import OverTime, is_tunable, problems_of
 from orchestrator.scenario.types import DEFAULT_MASTER, UNITS, Provenance
 
 Known = Mapping[str, Mapping[str, Variable]]
@@ -34,7 +35,8 @@ def known_variables(document: Document) -> tuple[Known, list[Complaint]]:
     for path, kind, section in _sections(document):
         fmu = section.get("fmu")
         try:
-            known[path] = vocabulary.of_fmu(Path(fmu)) if isinstance(fmu, str) else _own(kind, section)
+            settings = table_of(section, "parameters")
+            known[path] = vocabulary.of_fmu(Path(fmu), settings) if isinstance(fmu, str) else _own(kind, section)
         except InputError as error:
             problems += [Complaint(f"{path}.{'fmu' if fmu else 'model'}", problem) for problem in error.problems]
     return known, problems
@@ -42,7 +44,7 @@ def known_variables(document: Document) -> tuple[Known, list[Complaint]]:
 
 def _sections(document: Document) -> Iterator[tuple[str, str, Document]]:
     """Yield path, kind (of a landing) and content of every section that stands for an FMU."""
-    for kind in ("cable", "robot", "contact"):
+    for kind in ("cable", "robot", "contact", "controller"):
         if isinstance(document.get(kind), dict):
             yield kind, kind, document[kind]
     for name, section in table_of(document, "components").items():
@@ -51,9 +53,9 @@ def _sections(document: Document) -> Iterator[tuple[str, str, Document]]:
 
 
 def _own(kind: str, section: Document) -> dict[str, Variable]:
-    """Return the variables of our own module: a landing's `kind`, or a component's `model`."""
+    """Return the variables of our own module: a landing's `kind`, or the `model` of a component or a controller."""
     model = section.get("model")
-    if kind:
+    if kind and kind != "controller":
         return vocabulary.of_module(kind, model if kind == "robot" and isinstance(model, str) else None)
     if isinstance(model, str) and model not in registry.names():
         raise InputError(f"no model {model!r}{nearest(model, registry.names())}")
@@ -111,6 +113,7 @@ def check(document: Document, known: Known) -> Iterator[Complaint]:
     yield from _step_problems(document)
     yield from _position_problems(document, known)
     yield from _limit_problems(document)
+    yield from _controller_problems(document, known)
 
 
 def _section_problems(path: str, section: Document, known: Mapping[str, Variable]) -> Iterator[Complaint]:
@@ -118,12 +121,23 @@ def _section_problems(path: str, section: Document, known: Mapping[str, Variable
         names = [v.name for v in known.values() if v.causality == causality]
         for name, value in table_of(section, group).items():
             place = f"{path}.{group}.{name}"
-            if name in names:
+            if name in known and is_tunable(known[name]) and (misplaced := _misplaced(group, value)):
+                yield Complaint(place, misplaced)
+            elif name in names or (name in known and is_tunable(known[name])):
                 yield from _value_problems(place, known[name], value)
             elif name in known:
                 yield Complaint(place, f"is no {causality}; its causality is {known[name].causality}")
             else:
                 yield Complaint(place, f"unknown key{nearest(name, names)}")
+
+
+def _misplaced(group: str, value: Any) -> str:
+    """Return what is wrong with the table in which a tunable parameter stands; empty if nothing is."""
+    if group == "parameters" and isinstance(value, OverTime):
+        return "is a tunable parameter; its table stands in inputs"
+    if group == "inputs" and not isinstance(value, OverTime):
+        return "is a parameter; one value for it stands in parameters, a table in inputs"
+    return ""
 
 
 def _value_problems(path: str, variable: Variable, value: Any) -> Iterator[Complaint]:
@@ -173,7 +187,11 @@ def _step_problems(document: Document) -> Iterator[Complaint]:
     span = stop - start
     if not 0.0 < span < float("inf"):
         return
-    n = max(1, round(span / step))
+    try:
+        n = number_of(span, step)
+    except ValueError as error:
+        yield Complaint("simulation.macro_step", f"{digits(step)} s: {error}")
+        return
     if abs(n * step - span) > 1e-9 * span:
         what = f"stop_time {digits(stop)} s" if start == 0.0 else f"the {digits(span)} s from start_time to stop_time"
         yield Complaint("simulation.macro_step", f"{digits(step)} s does not divide {what}; {digits(span / n)} s does")
@@ -202,3 +220,22 @@ def _limit_problems(document: Document) -> Iterator[Complaint]:
     for here, there in (SPACING, SPACING[::-1]):
         if here in limits and there not in limits:
             yield Complaint(f"limits.{here}", f"says nothing without limits.{there}; give both")
+
+
+def _controller_problems(document: Document, known: Known) -> Iterator[Complaint]:
+    """Yield a model that is no controller, and inputs of the robot that the scenario gives beside it."""
+    section = document.get("controller")
+    if not isinstance(section, dict):
+        return
+    model = section.get("model")
+    if isinstance(model, str) and model in registry.names() and registry.find(model).contract != "controller":
+        yield Complaint("controller.model", f"{model} is no controller{nearest(model, controllers())}")
+    outputs = [v.name for v in known.get("controller", {}).values() if v.causality == "output"]
+    for name in table_of(table_of(document, "robot"), "inputs"):
+        if name in outputs:
+            yield Complaint(f"robot.inputs.{name}", "is what the controller gives; leave it out, or the controller")
+
+
+def controllers() -> list[str]:
+    """Return the modules that can play the part of a controller."""
+    return [key for key, entry in registry.MODULES.items() if entry.contract == "controller"]

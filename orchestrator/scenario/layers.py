@@ -10,6 +10,8 @@ from typing import Any
 
 from orchestrator.catalogue import shelf
 from orchestrator.catalogue.documents import (
+    DEEPEST,
+    TOO_DEEP,
     Document,
     Stack,
     bare,
@@ -19,12 +21,16 @@ from orchestrator.catalogue.documents import (
     is_whole,
     leaves,
     merged,
+    parsed,
+    read,
 )
 from orchestrator.catalogue.scenarios import find
 from orchestrator.coupling.errors import InputError
 from orchestrator.coupling.masters.options import master_options
 from orchestrator.scenario import line_state
 from orchestrator.scenario.named_sets import make_room
+from orchestrator.scenario.ssp.archive import is_structure
+from orchestrator.scenario.ssp.document import document as of_structure
 from orchestrator.scenario.types import DEFAULT_MASTER
 
 NAMED_TABLES = ("parameters", "inputs", "tolerances")
@@ -35,7 +41,15 @@ SET = "--set"
 def files(path: Path) -> tuple[Stack, list[str]]:
     """Return the scenario file at `path` over those that it extends, and what is to be said of it."""
     stack, notes = Stack(), []
-    for file, document in chain(path, find):
+
+    def content(file: Path) -> Document:
+        if not is_structure(file):
+            return read(file)
+        document, said = of_structure(file)
+        notes.extend(said)
+        return document
+
+    for file, document in chain(path, find, content):
         named = named_tables(document)
         resolve_paths(named, file.parent)
         notes += lay(stack, named, str(file))
@@ -70,7 +84,7 @@ def _make_room(document: Document, above: Document) -> list[str]:
 
 def _sections(document: Document) -> Iterator[tuple[str, ...]]:
     """Yield the places of the sections that may name a model or an FMU."""
-    for key in ("cable", "robot", "contact"):
+    for key in ("cable", "robot", "contact", "controller"):
         if key in document:
             yield (key,)
     components = document.get("components")
@@ -178,13 +192,13 @@ def override(stack: Stack, texts: Iterable[str], folder: Path) -> list[str]:
 
     Together they are one file, the last; `folder` is what paths in them are relative to.
     """
-    parsed = [_parsed(text) for text in texts]
+    changes = [_parsed(text) for text in texts]
     together: Document = {}
-    for _, tables, given in parsed:
+    for _, tables, given in changes:
         together = merged(together, _within(tables, given))
     resolve_paths(together, folder)
     notes = _make_room(stack.document, together)
-    for text, tables, given in parsed:
+    for text, tables, given in changes:
         table = stack.document
         for key in tables:
             table = table.setdefault(key, {})
@@ -202,6 +216,8 @@ def _parsed(text: str) -> tuple[str, list[str], Document]:
     if not (path and equals and value):
         raise InputError(f"{SET} {text}: write key=value, for instance robot.parameters.mass=12")
     *tables, last = _keys(path)
+    if len(tables) > DEEPEST:
+        raise InputError(f"{SET} {text}: {TOO_DEEP}")
     return text, tables, named_tables({last: _toml_value(value, text)})
 
 
@@ -222,8 +238,12 @@ def _keys(path: str) -> list[str]:
 def _toml_value(value: str, text: str) -> Any:
     """Return a TOML value; a bare word is taken as a string, so that a shell's quotes can be left out."""
     try:
-        return tomllib.loads(f"v = {value}")["v"]
-    except tomllib.TOMLDecodeError:
+        found = parsed(f"v = {value}")
+    except ValueError as error:
         if re.fullmatch(r"[A-Za-z_./][\w./+-]*", value):
             return value
-        raise InputError(f"{SET} {text}: {value} is not a TOML value; quote a string") from None
+        why = "is not a TOML value; quote a string" if isinstance(error, tomllib.TOMLDecodeError) else str(error)
+        raise InputError(f"{SET} {text}: {value} {why}") from None
+    if len(found) > 1:
+        raise InputError(f"{SET} {text}: give one value, and the next with a {SET} of its own")
+    return found["v"]

@@ -121,10 +121,15 @@ def _rows(path: str, written: _Written) -> tuple[list[float], list[Any]]:
     return time, columns[name]
 
 
+def is_tunable(variable: Variable) -> bool:
+    """Return whether it is a parameter that may change at communication points."""
+    return variable.causality == "parameter" and variable.discrete
+
+
 def problems_of(path: str, variable: Variable, value: OverTime) -> list[Complaint]:
     """Return what keeps a variable from following a table."""
-    if variable.causality != "input":
-        return [Complaint(path, "has one value over the run; only inputs follow a table")]
+    if variable.causality != "input" and not is_tunable(variable):
+        return [Complaint(path, "has one value over the run; only inputs and tunable parameters follow a table")]
     if variable.kind == "string":
         return [Complaint(path, "is a string and cannot follow a table; give one value")]
     if variable.kind in ("integer", "boolean"):

@@ -23,7 +23,7 @@ from orchestrator.scenario.named_sets import fill_in
 from orchestrator.scenario.over_time import parse
 from orchestrator.scenario.types import GraphScenario, LandingScenario, Provenance, Scenario
 
-LANDING_KEYS = ("cable", "robot", "contact", "landing")
+LANDING_KEYS = ("cable", "robot", "contact", "controller", "landing")
 GRAPH_KEYS = ("components", "connections")
 COMMAND_LINE = "command line"
 ELSEWHERE = {"robot.limits": "limits stand in [limits], or in the robot's own file"} | {

@@ -48,7 +48,7 @@ def _scalar(value: Any) -> Scalar:
 Settings = dict[str, Annotated[Any, AfterValidator(_scalar)]]
 Inputs = dict[str, Annotated[Any, AfterValidator(as_input)]]
 Positive = Annotated[float, Field(gt=0.0)]
-Count = Annotated[int, Field(ge=1)]
+Count = Annotated[int, Field(ge=1, le=10**6)]
 NonNegative = Annotated[float, Field(ge=0.0)]
 Temperature = Annotated[float, Field(ge=-100.0, le=300.0)]
 """°C, of a line."""
@@ -67,8 +67,10 @@ class Simulation(Section):
     `tolerances`: the largest `relative_max_error` that `compare` lets pass, by signal.
 
     `estimate`: by which second run `run` estimates the error of those signals, if any (docs/concepts/error.md). `timeout`: wall
-    time that an FMU may take for one step or its initialisation; none: as long as it likes. `record`: the signals that are
-    kept, ``component.variable``, of any causality; none: all outputs.
+    time that an FMU may take for one step or its initialisation, and for any call in a process of its own; none: as long as it
+    likes. `memory_limit`: MB that an FMU may take in such a process. `record`: the signals that are kept,
+    ``component.variable``, of any causality; none: all outputs. `output_interval`: s from row to row of the results, a whole
+    number of macro steps, twice that with ``estimate = "coarser"``; none: a row each communication point.
     """
 
     start_time: Annotated[float, In("s")] = 0.0
@@ -79,7 +81,14 @@ class Simulation(Section):
     tolerances: dict[str, Positive] = {}
     estimate: Literal["finer", "coarser", "none"] = "finer"
     timeout: Annotated[Positive | None, In("s")] = None
+    memory_limit: Positive | None = None
     record: Annotated[list[str], Field(min_length=1)] | None = None
+    output_interval: Annotated[Positive | None, In("s")] = None
+
+    @property
+    def every(self) -> int:
+        """Macro steps from row to row of the results."""
+        return 1 if self.output_interval is None else max(round(self.output_interval / self.macro_step), 1)
 
     @property
     def duration(self) -> float:
@@ -90,6 +99,17 @@ class Simulation(Section):
     def _forward(self) -> Self:
         if not self.duration > 0.0:
             raise ValueError(f"stop_time {self.stop_time:g} s must be after the start at {self.start_time:g} s")
+        return self
+
+    @model_validator(mode="after")
+    def _whole(self) -> Self:
+        unit = (2.0 if self.estimate == "coarser" else 1.0) * self.macro_step
+        rows = 1.0 if self.output_interval is None else self.output_interval / unit
+        if abs(rows - round(rows)) > 1e-9 * rows or round(rows) < 1:
+            steps = 'macro steps, twice that with estimate = "coarser"' if unit > self.macro_step else "macro steps"
+            raise ValueError(
+                f"output_interval {self.output_interval:g} s must be a whole number of {steps}: of {unit:g} s"
+            )
         return self
 
 
@@ -135,10 +155,12 @@ class CableSection(Section):
 
     `conductor` is one of the catalogue, or a TOML file like those there; `stiffness_set` one of its sets. Without a
     conductor the latter is a label. What `parameters` of the same file give wins. `state`: how the line is strung.
-    `steps`, here and below: steps that the FMU makes in each step of the master (docs/reference/masters.md).
+    `steps`, here and below: steps that the FMU makes in each step of the master (docs/reference/masters.md). `isolate`, here
+    and below: whether the FMU lives in a process of its own; a foreign one does if nothing is said.
     """
 
     fmu: str | None = None
+    isolate: bool | None = None
     conductor: str | None = None
     stiffness_set: str = "unnamed"
     steps: Count = 1
@@ -154,6 +176,7 @@ class RobotSection(Section):
 
     model: str | None = None
     fmu: str | None = None
+    isolate: bool | None = None
     steps: Count = 1
     parameters: Settings = {}
     inputs: Inputs = {}
@@ -172,8 +195,27 @@ class ContactSection(Section):
     """
 
     fmu: str | None = None
+    isolate: bool | None = None
     stiffness_set: str | None = None
     parameters: Settings = {}
+
+
+class ControllerSection(Section):
+    """What flies the robot: a module of ours or of an installed package (`model`), or any FMU of the contract (`fmu`).
+
+    Where it has the parameters mass, gravity, inertia.xx …, max_thrust, they are the robot's unless given.
+    """
+
+    model: str | None = None
+    fmu: str | None = None
+    isolate: bool | None = None
+    parameters: Settings = {}
+
+    @model_validator(mode="after")
+    def _one_controller(self) -> ControllerSection:
+        if (self.model is None) == (self.fmu is None):
+            raise ValueError('give either model = "setdown" or fmu = "FILE.fmu"')
+        return self
 
 
 class LandingSection(Section):
@@ -246,6 +288,7 @@ class Component(Section):
 
     model: str | None = None
     fmu: str | None = None
+    isolate: bool | None = None
     steps: Count = 1
     continuous: list[str] = []
     parameters: Settings = {}
@@ -323,11 +366,12 @@ class _Common(Section):
 
 
 class LandingScenario(_Common):
-    """A robot comes down on a cable: cable, robot, one contact a wheel, and where they meet."""
+    """A robot comes down on a cable: cable, robot, one contact a wheel, what flies it if anything does, where they meet."""
 
     cable: CableSection
     robot: RobotSection
     contact: ContactSection = ContactSection()
+    controller: ControllerSection | None = None
     landing: LandingSection
     limits: LimitsSection = LimitsSection()
 

@@ -165,7 +165,7 @@ def all_points(figure: Figure, book: Book) -> None:
 
 
 def _relative(table: Table | None) -> Table | None:
-    return None if table is None else table | {Z: table[Z] - table[Z][0]}
+    return None if table is None else {**table, Z: table[Z] - table[Z][0]}
 
 
 def tension(figure: Figure, book: Book) -> None:

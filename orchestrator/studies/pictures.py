@@ -5,6 +5,7 @@ from __future__ import annotations
 from dataclasses import dataclass
 from pathlib import Path
 
+from orchestrator.report.drawn import drawn
 from orchestrator.report.style import saved
 from orchestrator.studies import figures, referee_figures
 from orchestrator.studies.book import Book
@@ -28,8 +29,14 @@ def draw(book: Book, folder: Path) -> list[Picture]:
     pictures = []
     for one in (*figures.DRAWINGS, *referee_figures.DRAWINGS):
         path = folder / f"{one.name}.png"
-        with saved(path, one.size, DPI) as figure:
-            one.draw(figure, book)
+        if not drawn(lambda one=one, path=path: _drawing(one, book, path)):
+            continue
         place = f"{folder.parent.name}/{folder.name}/{path.name}"
         pictures.append(Picture(place, one.title, one.caption, one.of_paper))
     return pictures
+
+
+def _drawing(one: figures.Drawing, book: Book, path: Path) -> list[Path]:
+    with saved(path, one.size, DPI) as figure:
+        one.draw(figure, book)
+    return [path]

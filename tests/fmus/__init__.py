@@ -88,9 +88,17 @@ def compiled(name: str) -> Path:
     return path
 
 
-def fmu(kind: str, name: str, *, rollback: bool = True, steps: int = 1, **parameters: float | int | str) -> Fmu:
+def fmu(
+    kind: str,
+    name: str,
+    *,
+    rollback: bool = True,
+    steps: int = 1,
+    isolate: bool = False,
+    **parameters: float | int | str,
+) -> Fmu:
     """Return an instance of a test FMU with parameters set."""
-    made = instance(build(kind, rollback=rollback), name, steps)
+    made = instance(build(kind, rollback=rollback), name, steps, isolate=isolate)
     made.set_parameters(parameters)
     return made
 
@@ -129,15 +137,17 @@ def oscillator(
     waveform: bool = False,
     rollback: bool = True,
     steps: tuple[int, int] = (1, 1),
+    isolate: bool = False,
 ) -> Graph:
     """Return two masses on springs to ground, coupled by a spring that belongs to the second one
     (force-displacement), with their sub-steps."""
     own = {"mass": MASS, "ground_stiffness": GROUND, "initial_position": start[0]}
-    a = fmu("link", "a", rollback=rollback, steps=steps[0], **own)
+    a = fmu("link", "a", rollback=rollback, steps=steps[0], isolate=isolate, **own)
     b = fmu(
         "wave" if waveform else "link",
         "b",
         steps=steps[1],
+        isolate=isolate,
         mass=MASS,
         ground_stiffness=ground,
         ground_damping=GROUND_DAMPING,

@@ -2,6 +2,6 @@
 
 from types import ModuleType
 
-from verification.coupling import estimate, work_precision
+from verification.coupling import catalogue, estimate, work_precision
 
-STUDIES: tuple[ModuleType, ...] = (estimate, work_precision)
+STUDIES: tuple[ModuleType, ...] = (estimate, work_precision, catalogue)

@@ -8,11 +8,11 @@ fatal).
 from __future__ import annotations
 
 import ctypes
-from collections.abc import Callable
+from collections.abc import Callable, Sequence
 from ctypes import CFUNCTYPE, byref, c_bool, c_char, c_double, c_int, c_size_t, c_uint, c_void_p
 from functools import partial
 from pathlib import Path
-from typing import Any, ClassVar
+from typing import Any, ClassVar, NamedTuple
 
 import numpy as np
 from fmpy import calloc, free
@@ -51,6 +51,26 @@ SavedState = c_void_p
 """Handle on the complete state of an instance."""
 
 
+LOST = 1 << 32
+"""In the place of a status, which has 32 bits: the process of the FMU has ended, or does not answer."""
+
+
+class Identity(NamedTuple):
+    """What of a description calls need: the `version` of FMI, the FMU's `identifier`, `guid` and the `tool` that made it."""
+
+    version: str
+    identifier: str
+    guid: str
+    tool: str
+
+    @classmethod
+    def of(cls, description: ModelDescription) -> Identity:
+        """Return that of an FMU for co-simulation."""
+        interface: Any = description.coSimulation
+        words = (description.fmiVersion, interface.modelIdentifier, description.guid, description.generationTool)
+        return cls(*(str(word or "") for word in words))
+
+
 def _text(message: bytes | None) -> str:
     return (message or b"").decode("utf-8", "replace").strip()
 
@@ -60,7 +80,7 @@ class Fmi2:
 
     Parameters
     ----------
-    description : model description
+    identity : of the FMU
     folder : where the FMU is unzipped
     name : instance name
     sink : receives status and text of every message the FMU logs
@@ -74,16 +94,15 @@ class Fmi2:
     }
     PREFIX, STATE, DERIVATIVE = "fmi2", "FMUstate", "fmi2GetDirectionalDerivative"
 
-    def __init__(self, description: ModelDescription, folder: Path, name: str, sink: Sink):
-        interface: Any = description.coSimulation
+    def __init__(self, identity: Identity, folder: Path, name: str, sink: Sink):
         self.slave: Any = self._load(
-            guid=description.guid,
-            modelIdentifier=interface.modelIdentifier,
+            guid=identity.guid,
+            modelIdentifier=identity.identifier,
             unzipDirectory=str(folder),
             instanceName=name,
         )
         self.sink = sink
-        self.python = PYTHONFMU in str(description.generationTool or "")
+        self.python = PYTHONFMU in identity.tool
         self._logger = logger(sink, final=self.python)  # kept as long as the FMU
         self._instantiate()
         self.component = self.slave.component
@@ -116,9 +135,9 @@ class Fmi2:
         self.sink(ERROR, f"the library has no {function}")
         return ERROR
 
-    def accessor(self, verb: str, kind: str, vr: np.ndarray, values: np.ndarray) -> Call:
+    def accessor(self, verb: str, kind: str, vr: np.ndarray, values: np.ndarray, doing: str = "") -> Call:
         """Return the call that gets or sets (`verb`) all of `vr` (n,) from or into `values` (m,); both are
-        kept."""
+        kept. `doing` is for those who find an error later."""
         sizes = (c_size_t,) if self.PREFIX == "fmi2" else (c_size_t, c_void_p, c_size_t)
         arguments = (c_void_p, c_size_t, c_void_p) if len(sizes) == 1 else (c_void_p, *sizes)
         function = self._raw(f"{self.PREFIX}{verb}{kind}", *arguments)
@@ -135,6 +154,14 @@ class Fmi2:
             call = self._raw(self.DERIVATIVE, *types)
             tail = (seed.ctypes.data, seed.size, out.ctypes.data, out.size)
         return call(unknown.ctypes.data, unknown.size, known.ctypes.data, known.size, *tail)
+
+    def begin_step(self, t: float, h: float, none_before: bool) -> None:
+        """Do nothing: `do_step` makes the step."""
+
+    @property
+    def took(self) -> float:
+        """Wall time of the last step, s: not measured here."""
+        return 0.0
 
     def do_step(self, t: float, h: float, none_before: bool) -> int:
         """Advance from `t` to `t + h`; `none_before`: no state from before `t` will be restored any more."""
@@ -164,6 +191,11 @@ class Fmi2:
         """Free a saved state."""
         return self._free_state(byref(state))
 
+    def configure(self, values: Sequence[tuple[str, int, int]]) -> int:
+        """Set structural parameters, type, reference and value of each, in configuration mode."""
+        self.sink(ERROR, "structural parameters are those of FMI 3.0")
+        return ERROR
+
     def enter_initialization(self, start: float, stop: float | None) -> int:
         """Set up the experiment and enter initialisation."""
         return self._checked(
@@ -189,18 +221,20 @@ class Fmi2:
         """Set one string."""
         return self._checked(lambda: self.slave.setString([vr], [text]))
 
-    def get_string(self, vr: int) -> str:
-        """Return one string."""
-        text = self.slave.getString([vr])[0]
-        return text.decode() if isinstance(text, bytes) else str(text)
+    def get_string(self, vr: int) -> tuple[int, str]:
+        """Return the status, and one string."""
+        found: list[Any] = [""]
+        status = self._checked(lambda: found.extend(self.slave.getString([vr])))
+        return status, found[-1].decode() if isinstance(found[-1], bytes) else str(found[-1])
 
     def terminate(self) -> int:
         """Let the FMU end its run: some write their files only now."""
         return self._checked(self.slave.terminate)
 
-    def free(self) -> None:
+    def free(self) -> int:
         """Free the instance; the library stays loaded (other instances use it)."""
         getattr(self.slave, f"{self.PREFIX}FreeInstance")(self.component)
+        return OK
 
 
 class Fmi3(Fmi2):
@@ -223,8 +257,8 @@ class Fmi3(Fmi2):
     def _instantiate(self) -> None:
         self.slave.instantiate(logMessage=lambda _e, status, _c, text: self.sink(status, _text(text)), loggingOn=True)
 
-    def __init__(self, description: ModelDescription, folder: Path, name: str, sink: Sink):
-        super().__init__(description, folder, name, sink)
+    def __init__(self, identity: Identity, folder: Path, name: str, sink: Sink):
+        super().__init__(identity, folder, name, sink)
         pointer = ctypes.c_void_p
         self._do_step = self._raw("fmi3DoStep", c_double, c_double, c_bool, pointer, pointer, pointer, pointer)
         self.flags = np.zeros(3, dtype=np.bool_)  # event handling needed, terminate, early return
@@ -255,6 +289,11 @@ class Fmi3(Fmi2):
         """Whether the step that has just been made shall be the last."""
         return bool(self.flags[1])
 
+    def configure(self, values: Sequence[tuple[str, int, int]]) -> int:
+        """Set structural parameters, type, reference and value of each, in configuration mode."""
+        sets = [partial(getattr(self.slave, f"set{kind}"), [vr], [value]) for kind, vr, value in values]
+        return self._checked(self.slave.enterConfigurationMode, *sets, self.slave.exitConfigurationMode)
+
     def enter_initialization(self, start: float, stop: float | None) -> int:
         """Enter initialisation."""
         return self._checked(lambda: self.slave.enterInitializationMode(startTime=start, stopTime=stop))
@@ -268,10 +307,9 @@ class Fmi1(Fmi2):
 
     TYPES: ClassVar[dict[str, tuple[str, type]]] = Fmi2.TYPES | {"Boolean": ("Boolean", np.int8)}
 
-    def __init__(self, description: ModelDescription, folder: Path, name: str, sink: Sink):
-        interface: Any = description.coSimulation
-        self._prefix = f"{interface.modelIdentifier}_"
-        super().__init__(description, folder, name, sink)
+    def __init__(self, identity: Identity, folder: Path, name: str, sink: Sink):
+        self._prefix = f"{identity.identifier}_"
+        super().__init__(identity, folder, name, sink)
         self._do_step = self._raw("fmi2DoStep", c_double, c_double, c_char)
 
     @staticmethod
@@ -305,9 +343,10 @@ class Fmi1(Fmi2):
         """Do nothing: it is initialised."""
         return OK
 
-    def free(self) -> None:
+    def free(self) -> int:
         """Free the instance; the library stays loaded (other instances use it)."""
         self.slave.fmi1FreeSlaveInstance(self.component)
+        return OK
 
 
 def binding_of(version: str) -> type[Fmi2]:

@@ -2,8 +2,9 @@
 
 from __future__ import annotations
 
-import hashlib
 import zipfile
+import zlib
+from collections.abc import Mapping
 from dataclasses import dataclass
 from functools import lru_cache
 from pathlib import Path
@@ -12,7 +13,24 @@ from xml.etree import ElementTree
 
 import fmpy
 import numpy as np
-from fmpy.model_description import ModelDescription, ModelVariable
+from fmpy.model_description import ModelDescription, ModelVariable, ValidationError
+
+from orchestrator.coupling.fmu.archive import ArchiveError, files_of, hash_of
+from orchestrator.coupling.fmu.standard import (
+    MOST_BYTES,
+    DescriptionError,
+    parsed_xml,
+    require_consistent,
+    require_sizes,
+    require_usable,
+)
+from orchestrator.coupling.reading import is_file
+
+NAME = "modelDescription.xml"
+STRUCTURAL = "structuralParameter"
+"""Causality of what the dimensions of arrays hang on (FMI 3.0)."""
+Structure = Mapping[str, int]
+NO_STRUCTURE: Structure = {}
 
 Kind = Literal["real", "integer", "boolean", "string", "binary", "clock"]
 KINDS: dict[str, Kind] = {
@@ -65,19 +83,44 @@ class Capabilities:
     internal_step: float | None = None
 
 
-def element_names(variable: ModelVariable) -> list[str]:
+def shape_of(variable: ModelVariable, structure: Structure = NO_STRUCTURE) -> tuple[int, ...]:
+    """Return the lengths of an array along its dimensions; () of a scalar.
+
+    Parameters
+    ----------
+    structure : values of structural parameters; others have their start values
+    """
+    lengths = (
+        d.start if d.start is not None else structure.get(d.variable.name, d.variable.start)
+        for d in variable.dimensions
+    )
+    return tuple(int(length) for length in lengths)
+
+
+def element_names(variable: ModelVariable, structure: Structure = NO_STRUCTURE) -> list[str]:
     """Return the names of a variable's elements: ``x``, or ``x[1]``, ``x[2]`` …, or ``x[1,1]``, ``x[1,2]`` …"""
-    if not variable.shape:
+    shape = shape_of(variable, structure)
+    if not shape:
         return [variable.name]
-    places = np.ndindex(*variable.shape)
+    places = np.ndindex(*shape)
     return [f"{variable.name}[{','.join(str(i + 1) for i in place)}]" for place in places]
 
 
-def ports_of(variable: ModelVariable) -> list[Port]:
+def structure_of(description: ModelDescription, settings: Mapping[str, Any]) -> dict[str, int]:
+    """Return those of the `settings` that are structural parameters; `ValueError` where the arrays become too large."""
+    names = {v.name for v in description.modelVariables if v.causality == STRUCTURAL}
+    found = {n: int(x) for n, x in settings.items() if n in names and isinstance(x, int) and not isinstance(x, bool)}
+    if found:
+        require_sizes(description.modelVariables, lambda variable: shape_of(variable, found))
+    return found
+
+
+def ports_of(variable: ModelVariable, structure: Structure = NO_STRUCTURE) -> list[Port]:
+    """Return the scalar variables that a variable consists of; parameters as for `shape_of`."""
     kind = KINDS.get(variable.type, "integer")
     unit = variable.unit or (variable.declaredType.unit if variable.declaredType else None) or ""
-    size = int(np.prod(variable.shape)) if variable.shape else 1
-    names = element_names(variable)
+    names = element_names(variable, structure)
+    size = len(names)
     fixed = (
         unit,
         kind,
@@ -94,48 +137,71 @@ def ports_of(variable: ModelVariable) -> list[Port]:
 
 def sha256_of(path: Path) -> str:
     """Return the SHA-256 of a file as hexadecimal digits."""
-    return hashlib.sha256(path.read_bytes()).hexdigest()
+    return hash_of(path)
 
 
 def parsed(path: Path) -> ModelDescription:
-    """Return FMPy's model description of an FMU; the same content is parsed once, whenever it was written."""
-    return _parsed(path, sha256_of(path))
+    """Return FMPy's model description of an FMU; the same content is parsed once, whenever it was written.
+
+    `ValueError` says what is wrong with the archive, or with the description.
+    """
+    return _parsed(path, sha256_of(path))[0]
+
+
+def departures(path: Path) -> tuple[str, ...]:
+    """Return where a description departs from the standard, by FMPy's validation; the FMU can be run all the same."""
+    return _parsed(path, sha256_of(path))[1]
 
 
 @lru_cache(maxsize=32)
-def _parsed(path: Path, sha256: str) -> ModelDescription:
-    description = fmpy.read_model_description(str(path), validate=False)
-    relative = _differences(path)
+def _parsed(path: Path, sha256: str) -> tuple[ModelDescription, tuple[str, ...]]:
+    root = _root(path)
+    require_usable(root)
+    try:
+        description, problems = fmpy.read_model_description(str(path), validate=True), ()
+    except ValidationError as error:
+        description, problems = fmpy.read_model_description(str(path), validate=False), tuple(error.problems)
+    require_consistent(description)
+    relative = _differences(root)
     for variable in description.modelVariables:
         stated, type_ = relative.get(variable.name), variable.declaredType
         variable.relativeQuantity = bool(type_ and type_.relativeQuantity) if stated is None else stated
-    return description
+    return description, problems
 
 
-def _differences(path: Path) -> dict[str, bool]:
+def _differences(root: ElementTree.Element) -> dict[str, bool]:
     """Return what the reals of a description say of ``relativeQuantity``; FMPy 0.3 does not find the attribute."""
     said: dict[str, bool] = {}
-    for variable in _model_description(path).iterfind("ModelVariables/*"):
+    for variable in root.iterfind("ModelVariables/*"):
         for element in (variable, *variable):
             if (text := element.get("relativeQuantity")) is not None:
                 said[variable.get("name", "")] = text in ("true", "1")
     return said
 
 
-def _model_description(path: Path) -> ElementTree.Element:
-    with zipfile.ZipFile(path) as archive, archive.open("modelDescription.xml") as file:
-        return ElementTree.parse(file).getroot()
+def _root(path: Path) -> ElementTree.Element:
+    """Return the root of the model description in an archive; `ValueError` says what is wrong with either."""
+    try:
+        with zipfile.ZipFile(path) as archive:
+            info = files_of(archive).get(NAME)
+            if info is None:
+                raise ArchiveError(f"its archive has no {NAME}; export the FMU anew")
+            if info.file_size > MOST_BYTES:
+                raise DescriptionError([f"it has {info.file_size / 2**20:.0f} MB, more than {MOST_BYTES // 2**20}"])
+            return parsed_xml(archive.read(info))
+    except (zipfile.BadZipFile, zlib.error, EOFError, UnicodeDecodeError, NotImplementedError, RuntimeError) as error:
+        raise ArchiveError(f"its archive is damaged: {error}; export the FMU anew") from None
 
 
 def read_description(path: Path) -> tuple[ModelDescription, str]:
     """Return model description and SHA-256 of an FMU; `ValueError` says what is wrong with it."""
-    if not path.is_file():
+    if not is_file(path):
         raise ValueError(f"{path}: no such file; build the FMUs, or correct the path")
     sha256 = sha256_of(path)
     try:
-        description = _parsed(path, sha256)
-    except Exception as error:
-        raise ValueError(f"{path}: not an FMU ({error})") from error
+        description, _ = _parsed(path, sha256)
+    except Exception as error:  # FMPy and lxml raise many kinds
+        raise ValueError(f"{path}: not an FMU: {error}") from error
     if description.coSimulation is None:
         raise ValueError(f"{path}: no co-simulation FMU; export it for co-simulation")
     if str(description.fmiVersion).startswith("1"):
@@ -147,14 +213,14 @@ def read_description(path: Path) -> tuple[ModelDescription, str]:
 
 def _read_capabilities(path: Path, interface: Any) -> None:
     """Write what an FMI 1.0 description says of its capabilities to FMPy's, which leaves them out."""
-    said = _model_description(path).find("Implementation/*/Capabilities")
+    said = _root(path).find("Implementation/*/Capabilities")
     for name in ("canHandleVariableCommunicationStepSize", "canBeInstantiatedOnlyOncePerProcess"):
         setattr(interface, name, said is not None and said.get(name) in ("true", "1"))
 
 
 def _provides_derivatives(path: Path) -> bool:
     """Return what an FMI 3.0 description says; FMPy 0.3 looks for the attribute under its name in FMI 2.0."""
-    interface = _model_description(path).find("CoSimulation")
+    interface = _root(path).find("CoSimulation")
     return interface is not None and interface.get("providesDirectionalDerivatives") in ("true", "1")
 
 

@@ -30,11 +30,11 @@ class Driven:
 
     A continuous input is given the mean over the step, and its slope where the FMU has an input ``_rate`` for it that is free;
     a motion, and what stands beside motions in an FMU that takes their means, its value at the end of the step (and its mean);
-    a discrete one the value at the start.
+    a discrete one, and a tunable parameter, the value at the start.
 
     Parameters
     ----------
-    courses : input → its course over time
+    courses : input or tunable parameter → its course over time
     taken : inputs of the FMU that something else sets: no slope or mean is written there
 
     Attributes
@@ -43,7 +43,7 @@ class Driven:
 
     Raises
     ------
-    ValueError : one of them is no input, or cannot follow such a course
+    ValueError : one of them is no input and no tunable parameter, or cannot follow such a course
     """
 
     def __init__(self, fmu: Fmu, courses: Mapping[str, Course], taken: Collection[str] = ()):
@@ -90,8 +90,11 @@ class Driven:
 
 def _require_possible(fmu: Fmu, name: str, course: Course) -> None:
     port = fmu.port(name)
-    if port.causality != "input":
-        raise ValueError(f"{fmu.name}.{name}: is no input but {port.causality}; only inputs follow a course over time")
+    if port.causality != "input" and not _is_tunable(port):
+        what = f"a {port.variability} parameter" if port.causality == "parameter" else port.causality
+        raise ValueError(
+            f"{fmu.name}.{name}: is no input but {what}; only inputs and tunable parameters follow a course over time"
+        )
     if port.kind == "string":
         raise ValueError(f"{fmu.name}.{name}: is a string, which has no course over time; give one value")
     if port.kind == "real":
@@ -108,8 +111,12 @@ def _is_free(port: Port) -> bool:
     return port.causality == "input" and port.kind == "real" and port.vr >= 0
 
 
+def _is_tunable(port: Port) -> bool:
+    return port.causality == "parameter" and port.variability == "tunable"
+
+
 def _is_discrete(port: Port) -> bool:
-    return port.kind != "real" or port.variability == "discrete"
+    return port.kind != "real" or port.variability == "discrete" or _is_tunable(port)
 
 
 def _is_at_end(fmu: Fmu, name: str) -> bool:

@@ -4,8 +4,8 @@ from __future__ import annotations
 
 from orchestrator.coupling.fmu.binding import DISCARD
 
-NOT_FINITE, TIMEOUT = 5, 6
-"""Failures beside the FMI statuses: an output is not finite, no answer in time."""
+NOT_FINITE, TIMEOUT, CRASHED = 5, 6, 7
+"""Failures beside the FMI statuses: an output is not finite, no answer in time, the FMU's own process has ended."""
 
 
 class FmuError(Exception):
@@ -15,7 +15,7 @@ class FmuError(Exception):
     ----------
     component : name of the instance
     time : s, start of the step that failed
-    status : 2 discard, 3 error, 4 fatal (FMI); 5 an output is not finite, 6 no answer in time
+    status : 2 discard, 3 error, 4 fatal (FMI); 5 an output is not finite, 6 no answer in time, 7 its process has ended
     message : what happened, with the FMU's own last message
     """
 

@@ -10,13 +10,18 @@ import numpy as np
 from orchestrator.coupling.fmu.binding import WARNING, Call, Fmi2
 from orchestrator.coupling.fmu.description import Port
 from orchestrator.coupling.fmu.failure import NOT_FINITE, FmuError
+from orchestrator.coupling.fmu.isolated import Isolated
 
 
 class Owner(Protocol):
     """What a group needs of the FMU that it belongs to."""
 
     name: str
-    fmi: Fmi2
+
+    @property
+    def fmi(self) -> Fmi2 | Isolated:
+        """Its calls."""
+        ...
 
     def port(self, name: str) -> Port:
         """Return the port; `ValueError` if there is none."""
@@ -46,8 +51,9 @@ class Block:
         self.direct = direct and bool(np.all(pick == self.elements))
         self.buffer = values if self.direct else np.zeros(int(starts[-1]), dtype=dtype)
         self.partial = len(set(self.elements.tolist())) < int(starts[-1])
-        self.get_call: Call = fmu.fmi.accessor("Get", kind, self.vr, self.buffer)
-        self.set_call: Call = fmu.fmi.accessor("Set", kind, self.vr, self.buffer)
+        span = span_of([port.name for port in ports])
+        self.get_call: Call = fmu.fmi.accessor("Get", kind, self.vr, self.buffer, f"reading {span}")
+        self.set_call: Call = fmu.fmi.accessor("Set", kind, self.vr, self.buffer, f"writing {span}")
 
     def get(self) -> int:
         status = self.get_call()
@@ -61,6 +67,11 @@ class Block:
         if not self.direct:
             self.buffer[self.elements] = self.values[self.pick]
         return self.set_call()
+
+
+def span_of(names: Sequence[str]) -> str:
+    """Return how variables that are read or written together are called."""
+    return names[0] if len(names) == 1 else f"{names[0]} … {names[-1]}"
 
 
 class Group:
@@ -122,7 +133,7 @@ class Group:
             self._name_not_finite()
 
     def _span(self) -> str:
-        return self.names[0] if len(self.names) == 1 else f"{self.names[0]} … {self.names[-1]}"
+        return span_of(self.names)
 
     def _name_not_finite(self) -> None:
         bad = [name for name, value in zip(self.names, self.values, strict=True) if not np.isfinite(value)]

@@ -22,6 +22,7 @@ class Messages:
     Attributes
     ----------
     count, warnings : of all messages; of those of status warning or worse
+    last : the last of all
     """
 
     def __init__(self) -> None:
@@ -29,7 +30,7 @@ class Messages:
         self._first: list[str] = []
         self._last: deque[str] = deque(maxlen=MOST)
         self._complaints: list[tuple[int, str]] = []
-        self._latest = ""
+        self._latest = self.last = ""
 
     def __iter__(self) -> Iterator[str]:
         yield from self._first
@@ -40,14 +41,22 @@ class Messages:
     def add(self, status: int, text: str) -> None:
         """Take a message."""
         line = f"[{LABELS[status] if 0 <= status < len(LABELS) else status}] {text}"
-        self.count += 1
-        (self._first if len(self._first) < MOST else self._last).append(line)
+        self._keep(line)
         if status < WARNING:
             return
         self.warnings += 1
         self._latest = line
         if len(self._complaints) < OF_A_CALL:
             self._complaints.append((status, line))
+
+    def print(self, text: str) -> None:
+        """Take a line that the FMU has printed in its own process."""
+        self._keep(f"[printed] {text}")
+
+    def _keep(self, line: str) -> None:
+        self.count += 1
+        (self._first if len(self._first) < MOST else self._last).append(line)
+        self.last = line
 
     def begin(self) -> None:
         """Note that a new call begins."""

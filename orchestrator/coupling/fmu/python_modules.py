@@ -82,10 +82,15 @@ def _is_installed(file: Path) -> bool:
     return any(file.resolve().is_relative_to(prefix) for prefix in INSTALLED)
 
 
+def is_python(folder: Path) -> bool:
+    """Return whether the FMU unzipped in `folder` is one in Python (pythonfmu)."""
+    return (folder / "resources" / "slavemodule.txt").is_file()
+
+
 def module_names(folder: Path) -> set[str]:
     """Return the names of the modules that an FMU in Python has of its own; an empty set for any other FMU."""
     resources = folder / "resources"
-    if not (resources / "slavemodule.txt").is_file():
+    if not is_python(folder):
         return set()
     files = {path.name.partition(".")[0] for path in resources.iterdir() if path.suffix in (".py", ".so", ".pyd")}
     packages = {path.name for path in resources.iterdir() if path.is_dir() and any(path.glob("*.py"))}

@@ -12,17 +12,27 @@ import numpy as np
 from orchestrator.coupling.errors import digits
 from orchestrator.coupling.exchange import MEAN, RATE, is_from_start, is_load, is_motion, suffixed
 from orchestrator.coupling.fmu.binding import ERROR, SavedState
-from orchestrator.coupling.fmu.description import Port
+from orchestrator.coupling.fmu.description import NO_STRUCTURE, Port, Structure
 from orchestrator.coupling.fmu.failure import FmuError
 from orchestrator.coupling.fmu.group import Group
 from orchestrator.coupling.fmu.instance import Fmu
+from orchestrator.coupling.fmu.isolated import Limits
 
 WHOLE = 1e-6  # how far a number of steps may be from a whole one
 
 
-def instance(path: str | Path, name: str, steps: int = 1, continuous: Iterable[str] = ()) -> Fmu:
-    """Return an instance of an FMU that makes `steps` steps in each of the master's; `continuous` as for `Fmu`."""
-    return Fmu(path, name, continuous) if steps == 1 else SubStepped(path, name, steps, continuous)
+def instance(
+    path: str | Path,
+    name: str,
+    steps: int = 1,
+    continuous: Iterable[str] = (),
+    isolate: bool | Limits = False,
+    structure: Structure = NO_STRUCTURE,
+) -> Fmu:
+    """Return an instance of an FMU that makes `steps` steps in each of the master's; the others as for `Fmu`."""
+    if steps == 1:
+        return Fmu(path, name, continuous, isolate, structure)
+    return SubStepped(path, name, steps, continuous, isolate, structure)
 
 
 class SubStepped(Fmu):
@@ -48,8 +58,16 @@ class SubStepped(Fmu):
     given : (m,) outputs over the whole step
     """
 
-    def __init__(self, path: str | Path, name: str | None, steps: int, continuous: Iterable[str] = ()):
-        super().__init__(path, name, continuous)
+    def __init__(
+        self,
+        path: str | Path,
+        name: str | None,
+        steps: int,
+        continuous: Iterable[str] = (),
+        isolate: bool | Limits = False,
+        structure: Structure = NO_STRUCTURE,
+    ):
+        super().__init__(path, name, continuous, isolate, structure)
         if steps < 1:
             raise ValueError(f"{self.name}: steps = {steps}; at least one is made")
         self.steps, self.length, self.stepped = steps, 0.0, False
@@ -106,7 +124,7 @@ class SubStepped(Fmu):
 
     def twin(self) -> Fmu:
         """Return a second instance with the same parameters, not initialised."""
-        twin = SubStepped(self.path, self.name, self.steps, self.continuous)
+        twin = SubStepped(self.path, self.name, self.steps, self.continuous, self.limits or False, self.structure)
         twin.set_parameters(self.parameters)
         if self.driven is not None:
             twin.follow(self.driven.courses, self.driven.taken)
@@ -142,6 +160,9 @@ class SubStepped(Fmu):
         if self.capabilities.variable_step:
             return super().allows(h / self.steps, H)
         return _is_whole(h * self.steps / H)
+
+    def begin(self, t: float, h: float) -> None:
+        """Do nothing: its sub-steps are made one by one."""
 
     # -- a step ---------------------------------------------------------------------------------------------
 

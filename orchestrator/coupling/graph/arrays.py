@@ -72,6 +72,7 @@ class Node:
     incoming, forward : move all its inputs, those after the torn ones, from `Graph.y`
     forward_values : view of `Graph.u`, the inputs after the torn ones
     feedthrough : whether one of the outputs depends on one of the inputs without a step
+    ends : its inputs at the end of the step that is being made, where other values act in it
     """
 
     name: str
@@ -88,6 +89,7 @@ class Node:
     forward: Transfer
     forward_values: np.ndarray
     feedthrough: bool = False
+    ends: np.ndarray | None = None
 
     def receive(self, y: np.ndarray) -> None:
         """Take the inputs that are not torn from the outputs `y`."""

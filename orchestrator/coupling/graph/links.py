@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+import re
 from collections.abc import Iterable, Mapping
 from dataclasses import dataclass
 
@@ -22,20 +23,34 @@ class GraphError(ValueError):
     """The graph cannot be built: the message names connection, cause and cure."""
 
 
+NUMBER = r"[+-]?(?:\d+\.?\d*|\.\d+)(?:[eE][+-]?\d+)?"
+LINEAR = re.compile(rf"(?:({NUMBER}) \* )?(.+?)(?: ([+-]) ({NUMBER}))?")
+"""Factor, source, sign and offset of ``2.0 * a.x + 1.0``; the blanks are part of it, names may have such signs."""
+
+
 @dataclass(frozen=True)
 class Connection:
-    """From an output to an input, both as ``component.variable``."""
+    """From an output to an input, both as ``component.variable``: input = `gain` * output + `offset`, in the input's unit."""
 
     source: str
     target: str
+    gain: float = 1.0
+    offset: float = 0.0
 
     @classmethod
     def parse(cls, text: str) -> Connection:
-        """Return the connection that is written as ``a.x -> b.u``; `GraphError` if it is not."""
-        source, arrow, target = (part.strip() for part in text.partition("->"))
-        if not (source and arrow and target):
+        """Return the connection that is written as ``a.x -> b.u`` or ``2.0 * a.x + 1.0 -> b.u``; `GraphError` if it is not."""
+        left, arrow, target = (part.strip() for part in text.partition("->"))
+        found = LINEAR.fullmatch(left)
+        if not (found and arrow and target):
             raise GraphError(f'connections: {text!r} is not of the form "a.x -> b.u"')
-        return cls(source, target)
+        gain, source, sign, offset = found.groups()
+        return cls(source, target, float(gain or 1.0), float(f"{sign or ''}{offset or 0.0}"))
+
+    @property
+    def is_plain(self) -> bool:
+        """Whether the value goes as it is."""
+        return (self.gain, self.offset) == (1.0, 0.0)
 
 
 def owner_of(signal: str) -> str:
@@ -88,7 +103,10 @@ def _checked(components: Mapping[str, Fmu], connection: Connection) -> Link:
         raise GraphError(f"{where}: {connection.target} is no input but {b.causality}; connect to an input")
     if (a.kind, b.kind) not in CASTS or not _holds(taker, b, giver, a):
         raise GraphError(f"{where}: {a.fmi_type} cannot feed {b.fmi_type}; connect variables of one type")
+    if b.kind != "real" and not connection.is_plain:
+        raise GraphError(f"{where}: {connection.target} is of type {b.kind}; only reals take a factor or an offset")
     gain, offset = _conversion(giver, a, taker, b, where)
+    gain, offset = connection.gain * gain, connection.gain * offset + connection.offset
     discrete = "discrete" in (a.variability, b.variability) or b.kind != "real" or a.kind != "real"
     return Link(source, target, gain, offset, discrete)
 

@@ -6,7 +6,7 @@ from typing import ClassVar
 
 from orchestrator.coupling.graph.graph import Graph, Node
 from orchestrator.coupling.masters.jacobi import extrapolate
-from orchestrator.coupling.stepping.interpolation import Between, History, Loads, step_node
+from orchestrator.coupling.stepping.interpolation import Between, History, Loads, begin_node, finish_node
 from orchestrator.coupling.stepping.master import Master
 from orchestrator.coupling.stepping.report import StepReport
 
@@ -52,12 +52,12 @@ class GaussSeidel(Master):
             extrapolate(graph, self.loads, self.history, t, H)
         between = self.between if self.history.order else None
 
-        def step(node: Node) -> None:
+        def begin(node: Node) -> None:
             if node.forward.size:
                 node.receive(graph.y)
-            step_node(between, node, t, H)
+            begin_node(between, node, t, H)
 
-        self.crew.round(step)
+        self.crew.round(begin, lambda node: finish_node(node, t, H))
         graph.refresh()
         if graph.observers:
             graph.accepted(t, H)

@@ -57,14 +57,14 @@ class Jacobi(Master):
         """Step with the inputs that are in the graph, then move the outputs."""
         graph = self.graph
 
-        def step(node: Node) -> None:
+        def begin(node: Node) -> None:
             if node.inputs.names:
                 node.inputs.set()
             if node.rates.names:
                 node.rates.set()
-            node.fmu.step(t, H)
+            node.fmu.begin(t, H)
 
-        self.crew.round(step)
+        self.crew.round(begin, lambda node: node.fmu.step(t, H))
         graph.acted[:] = graph.u
         graph.refresh()
         if graph.observers:

@@ -2,7 +2,7 @@
 
 from __future__ import annotations
 
-from collections.abc import Sequence
+from collections.abc import Mapping, Sequence
 from dataclasses import dataclass, field
 
 import numpy as np
@@ -12,8 +12,12 @@ from orchestrator.coupling.fmu.failure import FmuError
 from orchestrator.coupling.fmu.group import Group
 from orchestrator.coupling.fmu.instance import Fmu
 from orchestrator.coupling.graph.graph import Graph
+from orchestrator.coupling.run.columns import Columns, Rows
 from orchestrator.coupling.run.results import Table
-from orchestrator.coupling.stepping.report import StepReport
+from orchestrator.coupling.run.steps import KINDS, NAMES, POWER, Steps
+
+WORK, RESIDUAL = "work ", "residual "
+"""Begin the names of a load's columns in the rows of a log."""
 
 
 @dataclass
@@ -22,16 +26,15 @@ class Log:
 
     Attributes
     ----------
-    time : (n + 1,) s, communication points, the start included
-    signals, values : names ``component.variable``, and (n + 1, len(signals))
+    signals : names ``component.variable``
     units : signal → unit that its FMU declares, ``1`` where it declares none
-    steps : n reports
+    rows : at each communication point that is recorded ``time``, the signals, and for each load the work done through it
+        and what it differs from that of the other side
+    reports : of every macro step, see `Steps`
+    every : how many macro steps lie between the points that are recorded
     wall, wall_first : s, the loop without its first step; that step, with all it compiles
     wall_components, solves : seconds inside each FMU's steps and their number, both without the first macro
         step
-    energy : load → work done on the component through it, accumulated, (n + 1,) J
-    energy_residual : load → that work less what the component at its other end has booked, accumulated, (n + 1,) J; see
-        `Work`
     error : None if the run came to its end
     ended : which FMU asked for the end before the stop time, and when; empty if none did
     """
@@ -39,29 +42,83 @@ class Log:
     master: str
     macro_step: float
     signals: list[str]
-    time: np.ndarray
-    values: np.ndarray
-    steps: list[StepReport] = field(default_factory=list)
+    rows: Rows
+    reports: Rows
+    every: int = 1
     wall: float = 0.0
     wall_first: float = 0.0
     wall_components: dict[str, float] = field(default_factory=dict)
     solves: dict[str, int] = field(default_factory=dict)
-    energy: dict[str, np.ndarray] = field(default_factory=dict)
-    energy_residual: dict[str, np.ndarray] = field(default_factory=dict)
     error: FmuError | None = None
     ended: str = ""
     units: dict[str, str] = field(default_factory=dict)
+
+    @property
+    def time(self) -> np.ndarray:
+        """The communication points that are recorded, (n + 1,) s, the start included."""
+        return self.rows.column("time")
+
+    @property
+    def points(self) -> np.ndarray:
+        """All communication points, recorded or not, (steps + 1,) s."""
+        if self.every == 1:
+            return self.time
+        first, last = self.rows.row(0)[0], self.rows.row(-1)[0]
+        return np.append(first + self.macro_step * np.arange(len(self.reports)), last)
+
+    @property
+    def values(self) -> np.ndarray:
+        """All signals at these points, (n + 1, len(signals))."""
+        return self.rows.array()[:, 1 : 1 + len(self.signals)]
+
+    @property
+    def steps(self) -> Steps:
+        """The reports of all macro steps."""
+        return Steps(self.reports)
 
     def signal(self, name: str) -> np.ndarray:
         """Return one signal over time, (n + 1,); `ValueError` names the nearest one that was recorded."""
         if name not in self.signals:
             raise ValueError(f"{name} was not recorded{nearest(name, self.signals)}")
-        return self.values[:, self.signals.index(name)]
+        return self.rows.column(name)
 
     @property
     def table(self) -> Table:
-        """All signals over time by name, ``time`` first, (n + 1,) each."""
-        return {"time": self.time, **dict(zip(self.signals, self.values.T, strict=True))}
+        """All signals over time by name, ``time`` first, (n + 1,) each; read from disk one by one where they are many."""
+        return _columns(self.rows, {name: name for name in ("time", *self.signals)})
+
+    @property
+    def steps_table(self) -> Table:
+        """What every macro step needed and reached, (steps,) each; `StepReport`, and the power residual of each load."""
+        powers = [f"{POWER}{name}" for name in self._booked]
+        return _columns(self.reports, {name: name for name in (*NAMES, *powers)}, KINDS)
+
+    @property
+    def energy(self) -> Table:
+        """Load → work done on the component through it, accumulated, (n + 1,) J."""
+        return _columns(self.rows, {name: f"{WORK}{name}" for name in self._loads})
+
+    @property
+    def energy_residual(self) -> Table:
+        """Load → that work less what the component at its other end has booked, accumulated, (n + 1,) J; see `Work`."""
+        return _columns(self.rows, {name: f"{RESIDUAL}{name}" for name in self._booked})
+
+    @property
+    def power_residual(self) -> Table:
+        """Load → difference of the powers on both sides of the interface in each macro step, (steps,) W."""
+        return _columns(self.reports, {name: f"{POWER}{name}" for name in self._booked})
+
+    @property
+    def _loads(self) -> list[str]:
+        return [name.removeprefix(WORK) for name in self.rows.names if name.startswith(WORK)]
+
+    @property
+    def _booked(self) -> list[str]:
+        """The loads whose other side books its work, too."""
+        if not len(self.rows):
+            return []
+        first, places = self.rows.row(0), self.rows.places
+        return [name for name in self._loads if not np.isnan(first[places[f"{RESIDUAL}{name}"]])]
 
     def raise_error(self) -> None:
         """Raise what ended the run before its time, if anything did."""
@@ -69,20 +126,20 @@ class Log:
             raise self.error
 
     @property
-    def power_residual(self) -> dict[str, np.ndarray]:
-        """Load → difference of the powers on both sides of the interface in each macro step, (n,) W."""
-        with np.errstate(over="ignore", invalid="ignore"):  # of a run that has diverged
-            return {name: np.diff(values) / self.macro_step for name, values in self.energy_residual.items()}
-
-    @property
     def unconverged(self) -> int:
         """Number of macro steps that did not reach the tolerance."""
-        return sum(not step.converged for step in self.steps)
+        return int(np.sum(~self.steps.column("converged")))
 
     @property
     def iterations_per_step(self) -> float:
         """Average number of iterations of a macro step."""
-        return sum(step.iterations for step in self.steps) / max(len(self.steps), 1)
+        return int(np.sum(self.steps.column("iterations"))) / max(len(self.reports), 1)
+
+
+def _columns(rows: Rows, names: Mapping[str, str], kinds: Mapping[str, type] | None = None) -> Table:
+    """Return columns by name, in memory if their rows are."""
+    found = Columns(rows, names, kinds)
+    return found.loaded() if rows.is_held else found
 
 
 class Recorder:

@@ -4,7 +4,10 @@ from __future__ import annotations
 
 import threading
 from collections.abc import Callable, Sequence
+from contextlib import nullcontext
+from pathlib import Path
 from time import perf_counter
+from typing import Any
 
 import numpy as np
 
@@ -15,10 +18,18 @@ from orchestrator.coupling.fmu.instance import Fmu
 from orchestrator.coupling.fmu.sub_steps import check_steps
 from orchestrator.coupling.graph.graph import Graph
 from orchestrator.coupling.masters import made_for
-from orchestrator.coupling.run.log import Log, Recorder
+from orchestrator.coupling.run.columns import Rows
+from orchestrator.coupling.run.interval import Between, Interval
+from orchestrator.coupling.run.log import RESIDUAL, WORK, Log, Recorder
+from orchestrator.coupling.run.spool import Saving
+from orchestrator.coupling.run.steps import NAMES, POWER, add
 from orchestrator.coupling.stepping.master import Master
 from orchestrator.coupling.stepping.report import StepReport
+from orchestrator.coupling.steps import number_of
 
+SIGNALS, STEPS = "signals.part", "steps.part"
+"""Files of a run that is going on."""
+EVERY_POINT = Interval()
 DIVIDES = 1e-9  # how far (stop - start)/macro_step may be from a whole number
 
 
@@ -31,6 +42,8 @@ def simulate(
     record: Sequence[str] | None = None,
     on_step: Callable[[StepReport], None] | None = None,
     timeout: float | None = None,
+    folder: Path | None = None,
+    interval: Interval = EVERY_POINT,
 ) -> Log:
     """Initialise the graph and advance it from `start` to `stop` in macro steps (s).
 
@@ -42,9 +55,12 @@ def simulate(
     record : signals to record (numbers of any type), ``component.variable``; None: every output, and every input that follows
         a course over time, by its value at the communication points
     on_step : called after every macro step
-    timeout : s of wall time that one call of an FMU may take. The run is then made in a thread of its own;
-        an FMU that hangs is left behind in it, and the caller should end the process (`os._exit`) once the
-        results are written.
+    timeout : s of wall time that one call of an FMU may take. One in a process of its own that takes longer is ended.
+        With others the run is made in a thread of its own; one that hangs is left behind in it, and the caller should end
+        the process (`os._exit`) once the results are written.
+    folder : where results are written to as they come, at least every half a second: ``signals.part`` and ``steps.part``
+        (`Spool`), from which a long log is read. None: all is kept in memory
+    interval : which communication points are recorded
 
     Returns
     -------
@@ -57,19 +73,22 @@ def simulate(
     ValueError
         if the macro step does not divide the time, does not suit an FMU's internal step, or a signal or a master of
         that name does not exist
+    OSError
+        results could not be written to `folder`; what stands there can be read
     """
     n, macro_step = steps_between(start, stop, macro_step)
     check_steps(graph.components, macro_step)
-    master, recorder = made_for(graph, master), Recorder(graph, record)
-    time, values = start + macro_step * np.arange(n + 1), np.full((n + 1, len(recorder.signals)), np.nan)
-    time[-1] = stop
-    log = Log(master.NAME, macro_step, recorder.signals, time, values, units=recorder.units)
-    simulation = _Simulation(graph, master, recorder, log, on_step)
-    if timeout is None:
-        simulation(start, stop)
-    else:
-        _watched(simulation, start, stop, timeout)
-    simulation.finish()
+    recorder = Recorder(graph, record)
+    simulation = _Simulation(graph, made_for(graph, master), recorder, (start, stop, n, macro_step), on_step)
+    log = simulation.prepare(folder, interval)
+    with Saving(log.rows, log.reports) if folder is not None else nullcontext():
+        if timeout is None or _limited(graph, timeout):
+            simulation(start, stop)
+        else:
+            _watched(simulation, start, stop, timeout)
+        simulation.finish()
+    for rows in (log.rows, log.reports):
+        rows.release()
     return log
 
 
@@ -79,7 +98,7 @@ def steps_between(start: float, stop: float, H: float) -> tuple[int, float]:
         raise ValueError(f"macro step {H:g} s: must be positive")
     if not stop > start:
         raise ValueError(f"stop time {digits(stop)} s: must be after the start at {digits(start)} s")
-    n = max(round((stop - start) / H), 1)
+    n = number_of(stop - start, H)
     even, error = (stop - start) / n, abs(n * H - (stop - start)) / (stop - start)
     if error > DIVIDES:
         raise ValueError(f"macro step {digits(H)} s does not divide {digits(stop - start)} s; {digits(even)} s does")
@@ -89,21 +108,38 @@ def steps_between(start: float, stop: float, H: float) -> tuple[int, float]:
 class _Simulation:
     """One run, callable from a thread."""
 
+    log: Log
+    between: Between
+
     def __init__(
         self,
         graph: Graph,
         master: Master,
         recorder: Recorder,
-        log: Log,
+        grid: tuple[float, float, int, float],
         on_step: Callable[[StepReport], None] | None,
     ):
-        self.graph, self.master, self.recorder, self.log, self.on_step = graph, master, recorder, log, on_step
-        self.rows, self.abandoned = 0, False
+        self.graph, self.master, self.recorder, self.on_step = graph, master, recorder, on_step
+        self.start, self.stop, self.n, self.H = grid
+        self.made, self.abandoned, self.pending = (
+            0,
+            False,
+            False,
+        )  # steps; whether the row of the last one is not yet added
         self.failure: BaseException | None = None
         self.work = master.work
-        self.energy = np.zeros((log.time.size, len(self.work.names)))
-        self.residual = np.zeros_like(self.energy)
+        self.residual = np.zeros(len(self.work.names))
         self.before = {name: (0.0, 0) for name in graph.components}  # wall and solves of the first macro step
+
+    def prepare(self, folder: Path | None, interval: Interval) -> Log:
+        """Return the log that is to be filled."""
+        recorder, loads = self.recorder, self.work.names
+        columns = ["time", *recorder.signals, *(f"{WORK}{n}" for n in loads), *(f"{RESIDUAL}{n}" for n in loads)]
+        rows = Rows(columns, folder and folder / SIGNALS)
+        reports = Rows([*NAMES, *(f"{POWER}{n}" for n in loads)], folder and folder / STEPS)
+        self.between = Between(interval, recorder.signals)
+        self.log = Log(self.master.NAME, self.H, recorder.signals, rows, reports, interval.every, units=recorder.units)
+        return self.log
 
     def __call__(self, start: float, stop: float) -> None:
         try:
@@ -125,21 +161,21 @@ class _Simulation:
         self.master.keep_books()
         self.master.start(start)
         if self.work.names:
-            self.residual[0] = self.work.residual
-        self.recorder.read(self.log.values[0], start)
-        self.rows = 1
+            self.residual[:] = self.work.residual
+        self._read(start)
+        self._add()
 
     def _advance(self) -> None:
-        log, step, H = self.log, self.master.step, self.log.macro_step
+        log, step, H = self.log, self.master.step, self.H
         clock = perf_counter()
-        for t in log.time[:-1].tolist():
+        for k in range(self.n):
             if self.abandoned:
                 return
-            report = step(t, H)
+            report = step(self._time(k), H)
             if self.abandoned:  # it came back after all
                 return
             self._note(report)
-            if self.rows == 2:
+            if self.made == 1:
                 log.wall_first, clock = perf_counter() - clock, perf_counter()
                 self.before = {name: (fmu.wall, fmu.solves) for name, fmu in self.graph.components.items()}
             log.wall = perf_counter() - clock
@@ -147,17 +183,43 @@ class _Simulation:
                 if fmu.fmi.ends:
                     raise FmuEnd(name, report.time)
 
+    def _time(self, k: int) -> float:
+        """Return the communication point after `k` steps, s."""
+        return self.start + self.H * k if k < self.n else self.stop
+
     def _note(self, report: StepReport) -> None:
         """Write the macro step that has just been made into the log."""
-        log, row = self.log, self.rows
-        self.recorder.read(log.values[row], float(log.time[row]))
-        log.steps.append(report)
-        if self.work.names:
-            self.energy[row], self.residual[row] = self.work.total, self.work.residual
-            report.power_residual = _largest(self.residual[row] - self.residual[row - 1]) / log.macro_step
-        self.rows += 1
+        log, loads = self.log, len(self.work.names)
+        powers: Any = ()
+        if loads:
+            made = self.work.residual - self.residual
+            self.residual[:] = self.work.residual
+            report.power_residual, powers = _largest(made) / self.H, made / self.H
+            report.energy_made = float(np.nansum(made)) if self.work.givers else np.nan
+        self.made += 1
+        self._read(self._time(self.made))
+        add(log.reports, report, powers)
+        if self.made % log.every == 0 or self.made == self.n:
+            self._add()
+        else:
+            self.between.keep(log.rows.next[1 : 1 + len(log.signals)])
         if self.on_step is not None:
             self.on_step(report)
+
+    def _read(self, t: float) -> None:
+        """Fill the next row of the log with what there is at the communication point `t` (s)."""
+        row, signals = self.log.rows.next, 1 + len(self.log.signals)
+        self.recorder.read(row[1:signals], t)  # where that fails, what may be pending stays as it is
+        row[0] = t
+        self.between.join(row[1:signals])
+        if self.work.names:
+            row[signals:] = np.concatenate([self.work.total, self.work.residual])
+        self.pending = True
+
+    def _add(self) -> None:
+        self.pending = False
+        self.between.clear()
+        self.log.rows.add()
 
     def abandon(self) -> None:
         """Leave the run's thread to itself, and all FMUs to it: the call it waits for may return."""
@@ -166,14 +228,12 @@ class _Simulation:
             fmu.abandoned = True
 
     def finish(self) -> None:
-        """Cut the log to what was reached; raise what was no failure of an FMU."""
+        """Complete the log; raise what was no failure of an FMU."""
         if self.failure is not None:
             raise self.failure
-        log, n = self.log, self.rows
-        log.time, log.values, log.steps = log.time[:n], log.values[:n], log.steps[: max(n - 1, 0)]
-        log.energy = dict(zip(self.work.names, self.energy[:n].T, strict=True))
-        booked = [i for i, name in enumerate(self.work.names) if not np.isnan(self.residual[:1, i]).any()]
-        log.energy_residual = {self.work.names[i]: self.residual[:n, i] for i in booked}
+        log = self.log
+        if self.pending:
+            self._add()
         for name, fmu in self.graph.components.items():
             wall, solves = self.before[name]
             log.wall_components[name], log.solves[name] = fmu.wall - wall, fmu.solves - solves
@@ -183,6 +243,13 @@ def _largest(energies: np.ndarray) -> float:
     """Return the largest magnitude of those that are booked, nan if none is."""
     booked = energies[~np.isnan(energies)]
     return float(np.max(np.abs(booked))) if booked.size else np.nan
+
+
+def _limited(graph: Graph, timeout: float) -> bool:
+    """Limit the calls of those FMUs that have processes of their own; return whether all have."""
+    for fmu in graph.components.values():
+        fmu.limit(timeout)
+    return all(fmu.limits for fmu in graph.components.values())
 
 
 def _watched(simulation: _Simulation, start: float, stop: float, timeout: float) -> None:
@@ -207,6 +274,6 @@ def _watched(simulation: _Simulation, start: float, stop: float, timeout: float)
 
 
 def _hung(graph: Graph, timeout: float) -> list[Fmu]:
-    """Return the FMUs whose call has taken longer than `timeout` (s) by now."""
+    """Return the FMUs of this process whose call has taken longer than `timeout` (s) by now."""
     given = perf_counter() - timeout
-    return [fmu for fmu in graph.components.values() if 0.0 < fmu.busy_since < given]
+    return [fmu for fmu in graph.components.values() if fmu.limits is None and 0.0 < fmu.busy_since < given]

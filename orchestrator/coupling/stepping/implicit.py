@@ -22,7 +22,7 @@ from orchestrator.coupling.graph.links import GraphError
 from orchestrator.coupling.stepping.accelerator import Accelerator
 from orchestrator.coupling.stepping.bounds import Count, NonNegative, Positive, PositiveCount
 from orchestrator.coupling.stepping.energy import EnergyAccount
-from orchestrator.coupling.stepping.interpolation import Between, Loads, step_node
+from orchestrator.coupling.stepping.interpolation import Between, Loads, begin_node, finish_node
 from orchestrator.coupling.stepping.master import Master, require_rollback
 from orchestrator.coupling.stepping.predictor import Predictor
 from orchestrator.coupling.stepping.replay import check_replay
@@ -318,8 +318,8 @@ class Implicit(Master):
         graph = self.graph
         graph.u[self.places] = x
 
-        def step(node: Node) -> None:
+        def begin(node: Node) -> None:
             node.receive(graph.y)
-            step_node(self.between, node, t, H)
+            begin_node(self.between, node, t, H)
 
-        self.crew.round(step)
+        self.crew.round(begin, lambda node: finish_node(node, t, H))

@@ -125,18 +125,29 @@ class Between:
 def step_node(between: Between | None, node: Node, t: float, H: float) -> None:
     """Step one component with the inputs in the graph, interpolated by `between` if given; read its
     outputs."""
-    ends = None
+    begin_node(between, node, t, H)
+    finish_node(node, t, H)
+
+
+def begin_node(between: Between | None, node: Node, t: float, H: float) -> None:
+    """Give a component its inputs, interpolated by `between` if given, and start its step."""
+    node.ends = None
     if between is not None and between.places[node.name].size:
-        ends = node.inputs.values.copy()
+        node.ends = node.inputs.values.copy()
         between.interpolate(node.name, H)
     if node.inputs.names:
         node.inputs.set()
     if node.rates.names:
         node.rates.set()
+    node.fmu.begin(t, H)
+
+
+def finish_node(node: Node, t: float, H: float) -> None:
+    """Make the step that was begun; read the outputs."""
     node.fmu.step(t, H)
     node.acted[:] = node.inputs.values
-    if ends is not None:
-        node.inputs.values[:] = ends
+    if node.ends is not None:
+        node.inputs.values[:] = node.ends
         if node.feedthrough:
             node.inputs.set()
     node.outputs.get_finite()

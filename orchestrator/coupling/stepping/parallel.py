@@ -1,7 +1,9 @@
-"""Components that do not wait for one another are stepped at the same time, in threads, where that pays.
+"""Components that do not wait for one another are stepped at the same time: in processes of their own, or in threads.
 
-A call of an FMU through ctypes leaves Python's interpreter lock, so that compiled FMUs run side by side. FMUs that hold the
-interpreter themselves (made with pythonfmu) would only wait for each other; they are stepped one by one.
+An FMU in a process of its own is told to step and goes on by itself; its answer is waited for when all others are under way.
+Of those in this process, a call through ctypes leaves Python's interpreter lock, so that compiled ones run side by side in
+threads, where that pays. FMUs that hold the interpreter themselves (made with pythonfmu) would only wait for each other; they
+are stepped one by one.
 """
 
 from __future__ import annotations
@@ -17,6 +19,9 @@ from time import perf_counter
 
 import numpy as np
 
+from orchestrator.coupling.fmu.binding import Fmi2
+from orchestrator.coupling.fmu.isolated import Isolated
+from orchestrator.coupling.fmu.sub_steps import SubStepped
 from orchestrator.coupling.graph.graph import Graph, Node
 
 CHOICES = ("auto", "always", "never")
@@ -30,14 +35,14 @@ Step = Callable[[Node], None]
 class Crew:
     """Makes one round over all components, batch after batch; the components of a batch need nothing of each other.
 
-    Results do not depend on whether threads are used: every component reads and writes places of its own. If several
-    fail at once, the error of the first in the order is raised, as without threads.
+    Results do not depend on what goes on at the same time: every component reads and writes places of its own. If several
+    fail at once, the error of the first in the order is raised, as one by one.
 
     Parameters
     ----------
     parallel : ``auto``: threads, at most one a processor, if in the first rounds those with threads took less time than
         those without, hand-over and all, and as long as rounds take less than the steps in them; ``always``: one a
-        component (for FMUs that wait for another computer); ``never``
+        component (for FMUs that wait for another computer); ``never``: all one by one, those in other processes too
     sequential : whether a component takes the outputs of earlier ones in the same round
     """
 
@@ -48,6 +53,8 @@ class Crew:
         self.batches = independent(graph) if sequential else [self.nodes]
         self.most = {"auto": processors(), "always": len(self.nodes), "never": 1}[parallel]
         self.always = parallel == "always"
+        self.ahead = [[] if parallel == "never" else goes_on_by_itself(batch) for batch in self.batches]
+        self.here = [[n for n in b if n not in ahead] for b, ahead in zip(self.batches, self.ahead, strict=True)]
         self.plans: list[list[list[Node]]] = []  # for each batch what each thread does, the caller's share first
         self.workers: list[_Worker] = []
         self.done: SimpleQueue[None] = SimpleQueue()
@@ -55,21 +62,27 @@ class Crew:
         self._reset()
 
     def _reset(self) -> None:
-        self.watching = self.most > 1 and any(len(compiled(batch)) > 1 for batch in self.batches)
+        self.watching = self.most > 1 and any(len(compiled(batch)) > 1 for batch in self.here)
         self.made, self.serial = 0, 0.0
         self.times: deque[float] = deque(maxlen=BLOCK)  # of the last rounds, s
 
-    def round(self, step: Step) -> None:
-        """Call `step` with every component."""
+    def round(self, begin: Step, finish: Step) -> None:
+        """Call `begin` and then `finish` with every component: what goes on by itself does so in between."""
         if self.watching:
             self._consider()
         clock = perf_counter()
-        if not self.plans:
-            for node in self.nodes:
-                step(node)
-        else:
-            for batch, plan in zip(self.batches, self.plans, strict=True):
-                self._together(step, batch, plan)
+
+        def step(node: Node) -> None:
+            begin(node)
+            finish(node)
+
+        for i, batch in enumerate(self.batches):
+            plan = self.plans[i] if self.plans else [self.here[i]]
+            if self.ahead[i] or len(plan) > 1:
+                self._together(begin, step, finish, batch, self.ahead[i], plan)
+            else:
+                for node in batch:
+                    step(node)
         if self.watching:
             self.made += 1
             self.times.append(perf_counter() - clock)
@@ -87,15 +100,27 @@ class Crew:
         self.workers, self.plans, self.done = [], [], SimpleQueue()
         self.watching = False
 
-    def _together(self, step: Step, batch: list[Node], plan: list[list[Node]]) -> None:
+    def _together(
+        self, begin: Step, step: Step, finish: Step, batch: list[Node], ahead: list[Node], plan: list[list[Node]]
+    ) -> None:
+        self._tried(begin, ahead)
         for worker, share in zip(self.workers, plan[1:], strict=False):
             worker.inbox.put(partial(self._work, step, share))
         self._work(step, plan[0])
         for _ in plan[1:]:
             self.done.get()
+        self._tried(finish, [node for node in ahead if node.name not in self.failures])
         if self.failures:
             failures, self.failures = self.failures, {}
             raise next(failures[node.name] for node in batch if node.name in failures)
+
+    def _tried(self, call: Step, nodes: Sequence[Node]) -> None:
+        """Call with each of `nodes`; what fails is raised later, an interruption at once: an answer may never come."""
+        for node in nodes:
+            try:
+                call(node)
+            except Exception as error:
+                self.failures[node.name] = error
 
     def _work(self, step: Step, share: Sequence[Node]) -> None:
         for node in share:
@@ -120,12 +145,12 @@ class Crew:
             self.before = self._books()
 
     def _start(self) -> None:
-        self.plans = [shares(batch, self._step_times(), self.most) for batch in self.batches]
+        self.plans = [shares(batch, self._step_times(), self.most) for batch in self.here]
         self.workers = [_Worker(self.done) for _ in range(max(len(plan) for plan in self.plans) - 1)]
 
     def _books(self) -> dict[str, tuple[float, int]]:
         """Return the time spent in each component's steps so far, s, and their number."""
-        return {node.name: (node.fmu.wall, node.fmu.solves) for node in self.nodes}
+        return {node.name: (node.fmu.wall, node.fmu.solves) for batch in self.here for node in batch}
 
     def _since(self) -> dict[str, tuple[float, int]]:
         """Return the same, since it was noted in `before`."""
@@ -168,7 +193,17 @@ def holds_interpreter(library: str) -> bool:
 
 def compiled(nodes: list[Node]) -> list[Node]:
     """Return the components that can be stepped in threads."""
-    return [node for node in nodes if not holds_interpreter(node.fmu.fmi.slave.dll._name)]
+    return [node for node in nodes if isinstance(node.fmu.fmi, Isolated) or not _is_python(node.fmu.fmi)]
+
+
+def _is_python(fmi: Fmi2) -> bool:
+    return holds_interpreter(fmi.slave.dll._name)
+
+
+def goes_on_by_itself(batch: list[Node]) -> list[Node]:
+    """Return the components that are to be told first, and waited for last; none where there is no other."""
+    alone = len(batch) == 1
+    return [] if alone else [n for n in batch if isinstance(n.fmu.fmi, Isolated) and not isinstance(n.fmu, SubStepped)]
 
 
 def shares(batch: list[Node], times: dict[str, float], most: int) -> list[list[Node]]:

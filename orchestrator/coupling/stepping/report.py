@@ -21,6 +21,7 @@ class StepReport:
     by_model : whether the iteration began from the models' free responses (of sub-steps, the last)
     converged : False if any part of it did not reach the tolerance
     estimate : a-posteriori error estimate, nan where none is made
+    energy_made : J, what all booked interfaces have made of it together, nan where none is booked
     power_residual : W, largest difference of the powers on both sides of an interface, nan where none is booked
     """
 
@@ -33,4 +34,5 @@ class StepReport:
     by_model: bool = False
     converged: bool = True
     estimate: float = nan
+    energy_made: float = nan
     power_residual: float = nan

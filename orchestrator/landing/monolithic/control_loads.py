@@ -17,10 +17,12 @@ class ControlLoads:
     Attributes
     ----------
     values : (2, 4 + 7 n_wheels) loads where a time begins within which they are straight, and their rates
+    last : loads that a controller leaves in the end, by their names
     """
 
     def __init__(self, robot: Robot, courses: Mapping[str, Course]):
-        places = _places(robot.n_wheels)
+        places = self.places = places_of(robot.n_wheels)
+        self.last: dict[str, float] = {}
         self.values = np.zeros((2, rb.BODY_LOADS + rb.WHEEL_LOADS * robot.n_wheels))
         self.courses = {places[name]: course for name, course in courses.items() if name in places}
         for name, place in places.items():
@@ -32,6 +34,8 @@ class ControlLoads:
         found = self.values[0].copy()
         for place, course in self.courses.items():
             found[place] = course.value[-1]
+        for name, value in self.last.items():
+            found[self.places[name]] = value
         return found
 
     def kinks(self, start: float, end: float) -> list[float]:
@@ -46,7 +50,7 @@ class ControlLoads:
             self.values[:, place] = first, rise / (end - start) if rise else 0.0
 
 
-def _places(n_wheels: int) -> dict[str, int]:
+def places_of(n_wheels: int) -> dict[str, int]:
     """Return the place of each control input among the loads."""
     found = {"thrust": rb.THRUST} | {f"torque.{axis}": rb.TORQUE + i for i, axis in enumerate("xyz")}
     for k in range(n_wheels):

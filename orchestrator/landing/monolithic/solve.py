@@ -14,6 +14,7 @@ from fmus.cable.state import make_work
 from fmus.contact.law import law_parameters
 from fmus.contact.module import Contact
 from fmus.kernels.time_integration import collocation
+from fmus.module.recipe import Module
 from fmus.module.variables import ModuleError, VariableTable
 from fmus.robot.module import Robot, body_parameters, initial_state
 from orchestrator.coupling.course import Course
@@ -21,6 +22,7 @@ from orchestrator.coupling.exchange import only_couples
 from orchestrator.landing.monolithic import control as steps
 from orchestrator.landing.monolithic.control_loads import ControlLoads
 from orchestrator.landing.monolithic.entry import CONTACT, Shown, advance_straight, begin, make_shown, show
+from orchestrator.landing.monolithic.pilot import Pilot
 from orchestrator.landing.monolithic.state import (
     ARC,
     AXLE_ALONG,
@@ -50,13 +52,15 @@ NEWTON = 1e-12
 class Problem:
     """Initialised modules that make one system; one contact a wheel, in the order of the wheels.
 
-    `courses`: inputs of the robot that follow a course over time; the others keep their values.
+    `courses`: inputs of the robot that follow a course over time; the others keep their values. `controller`: what flies it,
+    not initialised.
     """
 
     cable: Cable
     robot: Robot
     contacts: list[Contact]
     courses: Mapping[str, Course] = field(default_factory=dict)
+    controller: Module | None = None
 
 
 @dataclass
@@ -115,8 +119,11 @@ class Integrator:
         event = EVENT * (tolerance / TOLERANCE) ** 0.5
         self.options = np.array([0.0, 0.0, longest, float(refinement)])
         self.control = np.array([0.02 * longest, longest, tolerance, event, NEWTON, 0.0, 0.0, 0.0, 0.0])
+        self.pilot = Pilot(problem.controller, robot, self) if problem.controller is not None else None
         if start_time is not None and begin(self.system, self.state, start_time, self.space, self.work) != OK:
             raise ModuleError("monolithic: the contact law fails at the start; check the initial pose of the robot")
+        if start_time is not None and self.pilot is not None:
+            self.pilot.start(start_time)
 
     @property
     def steps(self) -> int:
@@ -124,15 +131,22 @@ class Integrator:
         return int(self.control[steps.STEPS])
 
     def advance(self, t: float, end: float) -> None:
-        """Integrate from `t` to `end` with controlled steps, which end where the course of an input has a kink.
+        """Integrate from `t` to `end` with controlled steps, which end where an input has a kink or the controller samples.
 
         Raises
         ------
         ModuleError : no step is short enough
         """
-        for first, last in pairwise([t, *self.loads.kinks(t, end), end]):
+        for first, last in pairwise([t, *self._stops(t, end), end]):
             self.loads.set(first, last)
             self._advance(first, last)
+            if self.pilot is not None:
+                self.pilot.reach(last)
+
+    def _stops(self, t: float, end: float) -> list[float]:
+        """Return the times within (`t`, `end`) at which the loads are not straight."""
+        kinks = self.loads.kinks(t, end)
+        return kinks if self.pilot is None else sorted({*kinks, *self.pilot.instants(t, end)})
 
     def _advance(self, t: float, end: float) -> None:
         """Integrate over a time in which the control loads are straight."""
@@ -168,6 +182,8 @@ class _Recorder:
         self.cable_rows = np.zeros((n, len(self.cable_names)))
         self.robot_rows = np.zeros((n, len(self.robot_names)))
         self.contact_rows = np.zeros((n, len(problem.contacts), len(CONTACT)))
+        self.pilot_names = integrator.pilot.outputs if integrator.pilot is not None else []
+        self.pilot_rows = np.zeros((n, len(self.pilot_names)))
 
     def record(self, i: int) -> None:
         """Write row `i` from the present state."""
@@ -177,11 +193,14 @@ class _Recorder:
         cable = np.concatenate([part.ravel() for part in (shown.ports, shown.cable, shown.shape, nodes)])
         self.cable_rows[i], self.robot_rows[i] = cable[self.cable_at], shown.robot[self.robot_at]
         self.contact_rows[i] = shown.contacts[:, : len(CONTACT)]
+        if one.pilot is not None:
+            self.pilot_rows[i] = one.pilot.values()
 
     def signals(self) -> dict[str, np.ndarray]:
         """Return every signal by name."""
         found = {f"cable.{name}": self.cable_rows[:, j] for j, name in enumerate(self.cable_names)}
         found |= {f"robot.{name}": self.robot_rows[:, j] for j, name in enumerate(self.robot_names)}
+        found |= {f"controller.{name}": self.pilot_rows[:, j] for j, name in enumerate(self.pilot_names)}
         for k in range(self.contact_rows.shape[1]):
             found |= {f"contact{k + 1}.{name}": self.contact_rows[:, k, j] for j, name in enumerate(CONTACT)}
         return found

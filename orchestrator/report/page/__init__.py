@@ -70,7 +70,7 @@ def _written(content: Content, directory: Path, web: Path) -> Path:
         text = template.filled(web, head.title, body, head.content(), content.data.blob.text, content.module)
     else:
         text = template.plain(head.title, body, _drawn(directory))
-    with replacing(directory / NAME) as temporary:
+    with replacing(directory / NAME, lasting=False) as temporary:
         temporary.write_text(text, encoding="utf-8")
     return directory / NAME
 

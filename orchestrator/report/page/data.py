@@ -24,6 +24,8 @@ SEEN = re.compile(
 """What is drawn of a landing, or judged."""
 
 
+TRIED = 400_000
+"""Points that are packed at most; what is longer has no place in a page, and took half a gigabyte to find that out."""
 NO_ARRAYS: Mapping[str, np.ndarray] = MappingProxyType({})
 
 
@@ -73,6 +75,8 @@ def pack_within(sources: Iterable[Source], most: int, others: Mapping[str, np.nd
     """
     sources, stride = list(sources), 1
     points = max((len(source.table["time"]) for source in sources), default=0)
+    while points / stride > TRIED:
+        stride *= 2
     blob = _packed(sources, stride, others)
     while len(blob.text) > most and stride < points:
         stride *= 2 ** max(1, int(np.log2(len(blob.text) / most)))
@@ -107,6 +111,6 @@ def _rows(source: Source, stride: int) -> np.ndarray:
     n = len(source.table["time"])
     if stride == 1:
         return np.arange(n)
-    values = [source.table[name] for name in source.names if name in source.table]
+    values = (source.table[name] for name in source.names if name in source.table)  # one at a time: they may be long
     extremes = [row for one in values for row in (int(np.argmin(one)), int(np.argmax(one)))]
     return np.unique([*range(0, n, stride), n - 1, *extremes])

@@ -11,6 +11,7 @@ import numpy as np
 
 from orchestrator.coupling.errors import InputError
 from orchestrator.coupling.run.results import replacing, write_json
+from orchestrator.report.drawn import drawn
 from orchestrator.report.style import BLACK, BLUE, GREY, VERMILION, saved, steady
 from orchestrator.runs.directory import circumstances
 from orchestrator.studies.fit import Estimate
@@ -37,12 +38,12 @@ def place_of(out: Path | None, name: str) -> Path:
 
 def write(folder: Path, found: Identified) -> list[Path]:
     """Write result, page and pictures to `folder`; return their paths."""
-    pictures = [*_series(folder, found), _claims(folder, found)]
+    write_json(folder / RESULT, content(found))
+    pictures = [*drawn(lambda: _series(folder, found)), *drawn(lambda: _claims(folder, found))]
     page = folder / "identification.md"
     with replacing(page) as temporary:
-        temporary.write_text("\n".join(_page(found, [p for p in pictures if p is not None])) + "\n", encoding="utf-8")
-    write_json(folder / RESULT, content(found))
-    return [folder / RESULT, page, *(p for p in pictures if p is not None)]
+        temporary.write_text("\n".join(_page(found, pictures)) + "\n", encoding="utf-8")
+    return [folder / RESULT, page, *pictures]
 
 
 def content(found: Identified) -> dict[str, Any]:
@@ -196,12 +197,12 @@ def _series(folder: Path, found: Identified) -> Iterator[Path]:
         yield path
 
 
-def _claims(folder: Path, found: Identified) -> Path | None:
+def _claims(folder: Path, found: Identified) -> list[Path]:
     """Draw the residual of every value of a claim, fitted and foretold."""
     chosen = [one for one in found.outcomes if one.datum.time is None]
     rows = [(f"{one.datum.name}", r, one.datum.used) for one in chosen for r in one.residual]
     if not rows:
-        return None
+        return []
     path = folder / "residuals.png"
     with saved(path, (6.0, 0.22 * len(rows) + 1.0)) as figure:
         axis = figure.subplots()
@@ -216,4 +217,4 @@ def _claims(folder: Path, found: Identified) -> Path | None:
         axis.set_xscale("symlog", linthresh=2.0)
         axis.set_xlabel("Ours less the paper's [uncertainties]; grey: within")
         axis.legend()
-    return path
+    return [path]

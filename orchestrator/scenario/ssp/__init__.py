@@ -1,0 +1,1 @@
+"""System structures of other tools read as scenarios: SSP 1.0 archives, and OspSystemStructure.xml."""
