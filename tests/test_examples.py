@@ -4,11 +4,14 @@ from __future__ import annotations
 
 import re
 import runpy
+import shutil
 from pathlib import Path
 from typing import Any
 
 import numpy as np
 import pytest
+
+from tests.fmus import needs_compiler
 
 POSITION, MASS = "landing.position", "robot.parameters.mass"
 FOLDER = Path(__file__).resolve().parents[1] / "examples"
@@ -70,6 +73,19 @@ def test_a_study_finds_where_it_is_safe_how_surely_and_why(example: Any) -> None
     indices = near.sensitivity[0].of["least_margin"]
     assert indices[MASS].total.estimate > indices["cable.parameters.mass_damping"].total.estimate
     assert Path("map.pdf").read_bytes().startswith(b"%PDF")
+
+
+@needs_compiler
+@pytest.mark.skipif(shutil.which("make") is None or shutil.which("gcc") is None, reason="no make, no gcc")
+def test_a_robot_in_c_obeys_in_both_versions_of_fmi(example: Any) -> None:
+    shown = example("robot_in_c")
+    assert all(trial.passed for trial in shown["trials"].values())
+    two, three = (shown["ends"][kind] for kind in ("c", "fmi3"))
+    assert two == three  # the same code
+    turn = -38.0 * (0.2152 + 0.1) / 5.42 * 0.1  # rad/s, about G; what it does to the lever is of order roll²
+    assert two["body.velocity.y"] == pytest.approx(0.1 - 0.1 * turn, rel=1e-3) and two["roll"] == pytest.approx(
+        turn / 20, rel=1e-3
+    )
 
 
 def test_every_example_is_tested_and_listed() -> None:

@@ -18,6 +18,7 @@ from typer.core import TyperGroup
 
 import orchestrator
 from orchestrator.cli import modes, new, options, printing, streams
+from orchestrator.cli.check import check
 from orchestrator.cli.export import export
 from orchestrator.cli.identify import identify
 from orchestrator.cli.start import importing
@@ -159,22 +160,7 @@ def limits(scenario: options.Scenario, robot: options.Robot = None, set_: option
         print(line)
 
 
-@app.command()
-def check(
-    fmu: Annotated[Path, typer.Argument(metavar="FILE.fmu", help="The FMU.")],
-    contract: Annotated[
-        str | None, typer.Option(help="robot, cable or contact. Default: the one it suits best.")
-    ] = None,
-) -> None:
-    """Check an FMU against a contract, point by point: that of a robot, a cable or a contact."""
-    from orchestrator.coupling.errors import DONE, MISSED
-    from orchestrator.landing.contract import check_fmu, is_met
-
-    kind, findings = check_fmu(fmu, contract)
-    printing.print_findings(kind, findings)
-    met = is_met(findings)
-    print(f"{fmu}: {'meets' if met else 'does not meet'} the {kind} contract")
-    raise typer.Exit(DONE if met else MISSED)
+app.command()(check)
 
 
 @app.command()

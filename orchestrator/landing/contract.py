@@ -1,7 +1,7 @@
-"""The contract between the FMUs, and whether a given FMU meets it, point by point.
+"""The contract between the FMUs, and whether a given FMU meets it, point by point, as far as it can be read.
 
 It is written here independently of our own modules, because it is what a foreign FMU has to meet;
-a test holds our modules against it.
+a test holds our modules against it. Whether an FMU does what its variables promise: `orchestrator.landing.trial`.
 """
 
 from __future__ import annotations
@@ -154,6 +154,10 @@ CONTROLLER = (
 )
 """Of its inputs it has those that it needs: any output of the robot by its name, any of contact k as ``contact[k].NAME``."""
 CONTRACTS = {"robot": ROBOT, "cable": CABLE, "contact": CONTACT, "controller": CONTROLLER}
+ANY = "any"
+"""What has no contract: it can be put on trial all the same (`orchestrator.landing.trial`)."""
+FEWEST = 2
+"""Variables that an FMU shares at least with the contract that it is held against; one may be so named by chance."""
 MOST_PORTS = 4
 BREAKS = ("missing", "wrong")
 """Verdicts with which a landing cannot run."""
@@ -184,24 +188,26 @@ def check_fmu(path: Path, kind: str | None = None) -> tuple[str, list[Finding]]:
 
     Parameters
     ----------
-    kind : ``robot``, ``cable``, ``contact`` or ``controller``; without it the contract that the FMU's variables suit best
+    kind : ``robot``, ``cable``, ``contact``, ``controller`` or ``any``; without it the contract that its variables suit best
     """
     description = vocabulary.description(path)
     known = vocabulary.of_fmu(path)
     kind = kind or best_contract(known)
-    if kind not in CONTRACTS:
-        raise InputError(f"{kind}: no such contract; choose one of {', '.join(CONTRACTS)}")
-    return kind, [*_capabilities(path, description), *check_variables(kind, known)]
+    if kind not in (*CONTRACTS, ANY):
+        raise InputError(f"{kind}: no such contract; choose one of {', '.join(CONTRACTS)}, {ANY}")
+    points = [] if kind == ANY else check_variables(kind, known)
+    return kind, [*_capabilities(path, description), *points]
 
 
 def best_contract(known: dict[str, Variable]) -> str:
-    """Return the contract of which `known` has the most variables, each an input, output or parameter as there."""
+    """Return the contract of which `known` has the most variables, each an input, output or parameter as there; or `ANY`."""
 
     def alike(kind: str) -> int:
         names = ((n, p.causality) for p in CONTRACTS[kind] for n in p.names(1))
         return sum(n in known and known[n].causality == causality for n, causality in names)
 
-    return max(CONTRACTS, key=alike)
+    best = max(CONTRACTS, key=alike)
+    return best if alike(best) >= FEWEST else ANY
 
 
 def check_variables(kind: str, known: dict[str, Variable]) -> list[Finding]:

@@ -43,7 +43,10 @@ def landing_graph(landing: Landing, exchange: str) -> Graph:
     """
     components: dict[str, Fmu] = {}
     files, scenario = _files(landing), landing.scenario
-    apart = {name: isolation(getattr(scenario, name), scenario.simulation) for name in ("cable", "robot", "contact")}
+    parts = {"cable": scenario.cable, "robot": scenario.robot, "contact": scenario.contact}
+    if scenario.controller is not None:
+        parts[CONTROLLER] = scenario.controller
+    apart = {name: isolation(section, scenario.simulation) for name, section in parts.items()}
     try:
         components["cable"] = instance(files["cable"], "cable", landing.cable.steps, isolate=apart["cable"])
         inner = (
@@ -56,7 +59,7 @@ def landing_graph(landing: Landing, exchange: str) -> Graph:
             components[f"contact{k}"] = Fmu(files["contact"], f"contact{k}", isolate=apart["contact"])
             components[f"contact{k}"].set_parameters({**landing.contact.settings, "initial.s": s})
         if landing.controller is not None:
-            components[CONTROLLER] = Fmu(files[CONTROLLER], CONTROLLER)
+            components[CONTROLLER] = Fmu(files[CONTROLLER], CONTROLLER, isolate=apart[CONTROLLER])
             components[CONTROLLER].set_parameters(landing.controller.settings)
         for fmu in components.values():  # the contract says so, whether or not a unit does
             fmu.declare(name for name in fmu.ports if is_slope_of_load(name))

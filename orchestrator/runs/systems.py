@@ -45,6 +45,7 @@ from orchestrator.landing.limits import limits_of
 from orchestrator.landing.resolve import MESH_KEYS, MESH_TOLERANCE, Landing, Variables
 from orchestrator.landing.resolve import resolve as resolve_landing
 from orchestrator.landing.safety import Limits, Safety, judge
+from orchestrator.landing.trial.remembered import said
 from orchestrator.landing.wiring import inner_step, lacking, landing_graph
 from orchestrator.scenario.isolation import isolation
 from orchestrator.scenario.over_time import courses, held
@@ -170,7 +171,14 @@ class LandingSystem:
         lacks = zip(contacts, lacking(graph.components), strict=True)
         fallen = [_fallen_back(name, graph.components[name], self.exchange, what) for name, what in lacks]
         unfed = _unfed([n for n in names if not is_control(variable_of(n))])
-        return [*filter(None, fallen), *unfed, *_means_alone(graph)]
+        return [*filter(None, fallen), *unfed, *_means_alone(graph), *self._untried(graph)]
+
+    def _untried(self, graph: Graph) -> Iterator[str]:
+        """Yield which foreign FMUs have not passed a trial, as far as one is remembered."""
+        parts = {"cable": self.landing.cable, "robot": self.landing.robot, "contact1": self.landing.contact}
+        for name, part in parts.items():
+            if part.foreign is not None:
+                yield from filter(None, [said(graph.components[name].sha256, name.rstrip("1"), part.foreign)])
 
     def problem(self) -> Callable[[], Problem] | None:
         """Return what makes the monolithic problem; None where our modules cannot stand for a foreign FMU."""

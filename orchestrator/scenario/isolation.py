@@ -3,9 +3,16 @@
 from __future__ import annotations
 
 from orchestrator.coupling.fmu.isolated import Limits
-from orchestrator.scenario.types import CableSection, Component, ContactSection, RobotSection, Simulation
+from orchestrator.scenario.types import (
+    CableSection,
+    Component,
+    ContactSection,
+    ControllerSection,
+    RobotSection,
+    Simulation,
+)
 
-Isolatable = CableSection | RobotSection | ContactSection | Component
+Isolatable = CableSection | RobotSection | ContactSection | ControllerSection | Component
 
 
 def is_isolated(section: Isolatable) -> bool:

@@ -208,6 +208,7 @@ class ControllerSection(Section):
 
     model: str | None = None
     fmu: str | None = None
+    isolate: bool | None = None
     parameters: Settings = {}
 
     @model_validator(mode="after")
