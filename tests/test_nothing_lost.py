@@ -25,6 +25,7 @@ import orchestrator
 from orchestrator.api import report_of
 from orchestrator.catalogue.library import build_all
 from orchestrator.cli import commands
+from orchestrator.coupling.run import spool
 from orchestrator.coupling.run.columns import Columns, Rows
 from orchestrator.coupling.run.results import plain, read_fields, read_table, write_fields
 from orchestrator.coupling.scratch import remove_left_overs, remove_parts, scratch
@@ -402,10 +403,11 @@ def check_full(out: Path, said: Path, status: int) -> None:
 
 
 @pytest.mark.parametrize("most", [2_000, 8_000, 30_000, 60_000])
-def test_a_file_that_may_not_grow(tmp_path: Path, most: int):
+def test_a_file_that_may_not_grow(tmp_path: Path, monkeypatch, most: int):
     """The system's own limit of a file's size (RLIMIT_FSIZE), at several points of a run: EFBIG."""
     import resource
 
+    monkeypatch.setattr(spool, "INTERVAL", 0.01)  # on a quick machine all of the run would be one piece
     out, said = tmp_path / "out", tmp_path / "said"
 
     def work() -> None:
@@ -419,8 +421,9 @@ def test_a_file_that_may_not_grow(tmp_path: Path, most: int):
 
 @pytest.mark.skipif(not hasattr(os, "geteuid") or os.geteuid() != 0, reason="only root may mount a small disk")
 @pytest.mark.parametrize("size", ["8k", "100k", "250k"])
-def test_a_full_disk(tmp_path: Path, size: str):
+def test_a_full_disk(tmp_path: Path, monkeypatch, size: str):
     """A small one, of memory, at several points of a run: ENOSPC."""
+    monkeypatch.setattr(spool, "INTERVAL", 0.01)
     disk, said = tmp_path / "disk", tmp_path / "said"
     disk.mkdir()
     if subprocess.run(["mount", "-t", "tmpfs", "-o", f"size={size}", "tmpfs", disk], capture_output=True).returncode:
