@@ -189,7 +189,7 @@ def test_steps_and_tolerances_change_together(kind, ratio, inner, stop):
         again.landing.robot.settings["integration_step"] == other.robot.parameters["integration_step"] == 0.001 * inner
     )
     changes = {name: change if ratio > 1 else 1 / change for name, change in estimate.TOLERANCES.items()}
-    before = {"tolerance": 1e-6, "local_tolerance": 1e-6}
+    before = {"tolerance": 3e-6, "local_tolerance": 1e-6}  # the master's own, and the scenario's
     assert other.master == {name: pytest.approx(before[name] * change) for name, change in changes.items()}
     assert "integration_step" not in system.scenario.robot.parameters
 

@@ -59,7 +59,9 @@ def print_run(run: Run) -> None:
         print(f"energy drift: {run.energy.drift:.2g} J of {run.energy.exchanged:.3g} J exchanged")
     if (made := summary.get("energy_made")) is not None:
         booked = f"{made['loads_booked']} of {made['loads']} loads booked"
-        print(f"energy made by the coupling: {made['end_J']:.2g} J, at most {made['largest_J']:.2g} J on the way; {booked}")
+        print(
+            f"energy made by the coupling: {made['end_J']:.2g} J, at most {made['largest_J']:.2g} J on the way; {booked}"
+        )
 
 
 def page_of(directory: Path | None) -> str:
