@@ -6,9 +6,6 @@ import re
 from collections.abc import Iterator, Mapping
 from pathlib import Path
 
-import numpy as np
-
-from fmus.module.variables import Value
 from orchestrator.catalogue import library
 from orchestrator.coupling.exchange import (
     EXCHANGES,
@@ -21,16 +18,11 @@ from orchestrator.coupling.fmu.sub_steps import instance
 from orchestrator.coupling.graph.graph import Graph
 from orchestrator.coupling.graph.links import Connection
 from orchestrator.coupling.graph.supply import Missing, Supply
-from orchestrator.coupling.masters.options import master_options
 from orchestrator.landing.resolve import Landing
 from orchestrator.scenario.isolation import isolation
 
 CONTROLLER = "controller"
 """Component that flies the robot."""
-TIGHTEST, LOOSEST = 1e-12, 1e-9
-"""m; range of the tolerance of Newton's method in a landing."""
-TOLERANCE = 1e-6
-"""Tolerance of a master that goes with it; at a smaller one Newton's method ends later."""
 LONGEST_ADAPTIVE = 2.5e-3
 """Longest inner step of our cable, s, where the master's steps are adaptive: long macro steps are then wanted, and the
 local error does not tell that of the cable's inner steps (docs/notebook/adaptive.md)."""
@@ -87,21 +79,6 @@ def _files(landing: Landing) -> dict[str, Path]:
     if section is not None and section.model is not None:
         ours[CONTROLLER] = library.module_recipe(section.model)
     return foreign | dict(zip(ours, library.kept(ours.values()), strict=True))
-
-
-def _effort(landing: Landing, exchange: Exchange) -> dict[str, Value]:
-    """Return inner step and tolerance of our own cable: no more exact than the macro step and its iteration are."""
-    if landing.cable.foreign is not None:
-        return {}
-    return {"integration_step": inner_step(landing, exchange), "newton_tolerance": newton_tolerance(landing)}
-
-
-def newton_tolerance(landing: Landing) -> float:
-    """Return where Newton's method of our cable ends (m): 1e-9 at 20 ms, less at smaller steps and tolerances."""
-    simulation = landing.scenario.simulation
-    options = master_options()[simulation.master] | landing.scenario.master
-    share = min(1.0, float(options.get("tolerance") or TOLERANCE) / TOLERANCE)
-    return float(np.clip(LOOSEST * share * (simulation.macro_step / 0.02) ** 2, TIGHTEST, LOOSEST))
 
 
 def inner_step(landing: Landing, exchange: Exchange) -> float:

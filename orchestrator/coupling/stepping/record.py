@@ -12,7 +12,7 @@ import numpy as np
 FORGET = 0.8  # weight of the past, as in the record of the polynomial's orders
 PROBE = 8  # steps after which the models are tried again where they had lost; twice as many each time they lose again
 WORTH = 0.5  # digits by which the models must be better: an iteration ends no sooner for less
-PAYS = 5.0  # what costs solves is done where it may save so many times as many
+PAYS = 8.0  # what costs solves is done where it may save so many times as many
 LEAST, LARGEST = 1e-15, 1e3  # residuals between which digits count
 
 
