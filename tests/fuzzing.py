@@ -61,13 +61,14 @@ def place() -> Iterator[Path]:
         for folder in (here, temporary, given):
             folder.mkdir()
         before, faults = (os.environ.get("TMPDIR"), tempfile.tempdir), _own("crashes", FAULTS)
+        others = list(instance._instances)  # of tests before
         os.environ["TMPDIR"] = tempfile.tempdir = str(temporary)
         stack.callback(_restore, *before)
         stack.enter_context(contextlib.chdir(here))
         yield given
         assert not [*here.iterdir()], "left in the current folder"
         assert not [*temporary.iterdir()], "left in the temporary folder"
-        assert not instance._instances, "an FMU was not freed"
+        assert instance._instances == others, "an FMU was not freed"
         assert _own("crashes", FAULTS) == faults, "a fault of this program"
         left = [*_own("unpacked", f"line-landing-{os.getpid()}-*"), *_own("instances", f"{os.getpid()}-*")]
         assert not left, "left in the cache"

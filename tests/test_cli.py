@@ -341,7 +341,9 @@ def test_an_fmu_that_hangs_ends_the_run(tmp_path: Path):
         "run", hanging(tmp_path), "--out", out, "--master", "gauss_seidel", "--set", "simulation.timeout=1.0"
     )
     assert done.returncode == 3 and monotonic() - clock < 40.0, done.stderr
-    assert "b, t = 0.1 s: no answer within 1 s" in done.stderr and f"results in {out}" in done.stdout
+    assert (
+        "b, t = 0.1 s: the step of 0.05 s: no answer within 1 s" in done.stderr and f"results in {out}" in done.stdout
+    )
     table = read_table(out / "results.csv")
     assert table["time"] == pytest.approx([0.0, 0.05, 0.1]) and table["a.x"] == pytest.approx(table["time"])
     content = manifest(out)

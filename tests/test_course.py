@@ -261,7 +261,7 @@ def test_what_nothing_feeds_is_no_longer_named():
         ("c.force", "no component 'c'"),
         ("a.forse", "no variable forse; did you mean force"),
         ("a.position", "is no input but output"),
-        ("a.mass", "is no input but parameter"),
+        ("a.mass", "is no input but a fixed parameter"),
         ("a.neighbour.position", "follows a table and is fed by b.position"),
     ],
 )

@@ -16,6 +16,7 @@ STARTS = {
     "cable": {"port[1].force.z": -50.0, "port[1].s": 80.0},
     "contact": {"wheel.position.z": 0.06},  # in touch
     "robot": {"thrust": 100.0, "wheel[1].force.x": 5.0},
+    "setdown": {"contact[1].normal_force": 100.0, "sample_time": 6e-3},  # all steps below divide it
     "oscillator": {"coupling_stiffness": 2.0, "coupling_damping": 0.1, "force": 1.0, "neighbour.position": 0.1},
 }
 """Inputs that bring every mechanism of the module into play."""

@@ -147,7 +147,7 @@ FILES = [
     ({"changes": [('fmiVersion="2.0"', 'fmiVersion="1.0"')]}, "not an FMU"),
     ({"changes": [("CoSimulation", "ModelExchange")]}, "export it for co-simulation"),
     ({"changes": [ONCE], "more": "isolate = false"}, "can be instantiated only once per process"),
-    ({"changes": [("<ModelVariables>", "<ModelVariables")]}, "modelDescription.xml cannot be read"),
+    ({"changes": [("<ModelVariables>", "<ModelVariables")]}, "its modelDescription.xml is not one: not well-formed"),
     ({"changes": [('"canGetAndSetFMUstate="true"', ""), ('canGetAndSetFMUstate="true"', "")]}, "cannot save its state"),
 ]
 

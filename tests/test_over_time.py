@@ -121,7 +121,10 @@ def test_wrong_files_and_places_are_refused(tmp_path):
     table = "{time=[0],value=[1]}"
     assert "did you mean thrust?" in problems(LANDING, f"robot.inputs.trust={table}")[0]
     assert "is no input; its causality is output" in problems(LANDING, f"robot.inputs.roll={table}")[0]
-    assert any("only inputs follow a table" in p for p in problems(LANDING, f"robot.parameters.mass={table}"))
+    assert any(
+        "only inputs and tunable parameters follow a table" in p
+        for p in problems(LANDING, f"robot.parameters.mass={table}")
+    )
 
 
 # -- landings ----------------------------------------------------------------------------------------------------

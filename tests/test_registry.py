@@ -91,7 +91,7 @@ def test_a_module_of_another_package_is_found_by_its_entry_point(installed, tmp_
     code = "from fmus.module.registry import find, names\n"
     code += "print(find('swing').description, sorted(set(names())))\n"
     done = run(installed, "-c", code, folder=tmp_path)
-    names = ["broken", "cable", "contact", "oscillator", "other", "robot", "swing", "wrong"]
+    names = ["broken", "cable", "contact", "oscillator", "other", "robot", "setdown", "swing", "wrong"]
     assert done.stdout.strip() == f"Damped oscillator {names}", done.stderr
 
 

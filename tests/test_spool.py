@@ -144,7 +144,7 @@ def test_kill_9_leaves_all_that_was_flushed(tmp_path: Path):
 
 def test_reports_are_what_they_were():
     rows = Rows([*NAMES, "power_residual.a"])
-    reports = [StepReport(0.1 * k, k, 1e-9 * k, k % 2, 0, 3, k != 2, float(k), -1.0) for k in range(1, 5)]
+    reports = [StepReport(0.1 * k, k, 1e-9 * k, k % 2, 0, 3, k == 3, k != 2, float(k), -1.0, 2.0) for k in range(1, 5)]
     for report in reports:
         add(rows, report, [7.0])
     steps = Steps(rows)

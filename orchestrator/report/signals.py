@@ -104,6 +104,8 @@ class _Kind:
     if_it_varies: bool = False
 
 
+INVISIBLE = 1e-6
+"""Range of a curve, over the largest in its panel, that nobody would see: what an iteration leaves of nothing."""
 LANDING = (
     _Kind("Z displacement", r"robot\.body\.position\.()z", "m", 1.0, "m", from_start=True),
     _Kind("Angle", r"robot\.(roll|pitch|yaw)", "°", DEGREES, "rad"),
@@ -132,7 +134,9 @@ def panels_for(
 def _of_kind(kind: _Kind, table: Table) -> Panel:
     found = {n: kind.words.format(m[1]) if m[1] else "" for n in table if (m := re.fullmatch(kind.pattern, n))}
     if kind.if_it_varies:
-        found = {name: words for name, words in found.items() if np.ptp(shown(table[name], kind.own_unit)) > 0.0}
+        spans = {name: float(np.ptp(shown(table[name], kind.own_unit))) for name in found}
+        least = INVISIBLE * max(spans.values(), default=0.0)
+        found = {name: words for name, words in found.items() if spans[name] > least}
     lines = found if len(found) > 1 else dict.fromkeys(found, "")
     return Panel(kind.label, kind.unit, lines, kind.factor, kind.own_unit, kind.from_start, kind.peaks)
 

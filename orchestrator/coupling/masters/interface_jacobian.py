@@ -24,6 +24,7 @@ from orchestrator.coupling.stepping.report import StepReport
 from orchestrator.coupling.stepping.step_control import joined
 
 WORST = 1e-2  # contraction of the outer iteration that the exactness of the inner one reckons with at most
+WILD = 10.0  # loads, over their scale, that no prediction is worth asking the contacts about
 PREDICTIONS = ("model", "polynomial")
 SMALLEST = 1e-5  # relative difference of the unknowns below which it says nothing about the Jacobian
 
@@ -149,7 +150,7 @@ class InterfaceJacobian(Implicit):
             model.last = own, model.free.foretold(H, J) + J @ own
         try:
             r = self._rest_residual(t, H, x, states)
-            found, solved = self._solve_interface(t, H, x, r, self.scale.norm(r, x, H), states)
+            found, solved = self._solve_interface(t, H, x, r, self.scale.norm(r, x, H), states, most=WILD)
         except FmuError as error:
             if not error.recoverable:
                 raise
@@ -275,11 +276,20 @@ class InterfaceJacobian(Implicit):
             self.graph.release(states)
 
     def _solve_interface(
-        self, t: float, H: float, x: np.ndarray, r: np.ndarray, residual: float, states: list[SavedState]
+        self,
+        t: float,
+        H: float,
+        x: np.ndarray,
+        r: np.ndarray,
+        residual: float,
+        states: list[SavedState],
+        most: float = np.inf,
     ) -> tuple[np.ndarray, bool]:
-        """Return the unknowns that meet the equation with the models, the best that were found, and whether they do;
-        `residual` is the norm of `r`."""
-        inner, best = self.inner, (np.inf, x)
+        """Return the unknowns that meet the equation with the models, the best that were found, and whether they do.
+
+        `residual` is the norm of `r`; it is given up where an unknown is `most` times its scale.
+        """
+        inner, best, limit = self.inner, (np.inf, x), most * self.scale.values
         inner.begin(H, self.scale.values)
         # the models leave about `contraction` of the residual: to solve more exactly than they are is of no use
         # (where the energy asks for more than the tolerance, the residual is below that already)
@@ -291,6 +301,8 @@ class InterfaceJacobian(Implicit):
                 inner.conclude()
                 return x, True
             x = inner.propose(x, r)
+            if np.any(np.abs(x) > limit):
+                break
             try:
                 r = self._rest_residual(t, H, x, states)
             except FmuError as error:
