@@ -37,12 +37,12 @@ def _exchanged(run: Coupled) -> float:
 def test_nothing_is_made_where_nothing_is_allowed(scenario: str, tolerance: float):
     """Expected: the sum is never above zero, at any communication point (`EnergyAccount`); the undamped line would keep what
     is made for ever, the drop has hard impacts."""
-    run = _run(scenario, 0.4, tolerance, 0)
+    run = _run(scenario, 0.2, tolerance, 0)
     assert np.max(_made(run)) <= ROUND_OFF * _exchanged(run)
 
 
 def test_no_more_is_made_than_the_contact_has_dissipated():
-    run = _run(UNDAMPED, 0.4, 1e-2, "dissipated")
+    run = _run(UNDAMPED, 0.2, 1e-2, "dissipated")
     made, dissipated = _made(run), run.table[f"contact1.{DISSIPATED}"]
     assert np.all(made <= dissipated + ROUND_OFF * _exchanged(run))
 
@@ -53,9 +53,9 @@ def test_without_a_budget_a_loose_tolerance_makes_energy():
     assert np.max(_made(run)) > 1e-6 * _exchanged(run)
 
 
-@pytest.mark.parametrize("master", ["iqn_ils", "anderson", "aitken", "fixed_point"])
+@pytest.mark.parametrize("master", ["iqn_ils", "anderson", "aitken"])
 def test_every_implicit_master_keeps_it(master: str):
-    run = _run("rig_10m", 0.1, 1e-3, 0, **{"simulation.master": master, "simulation.macro_step": 0.0005})
+    run = _run("rig_10m", 0.05, 1e-3, 0, **{"simulation.master": master, "simulation.macro_step": 0.0005})
     assert np.max(_made(run)) <= ROUND_OFF * _exchanged(run)
 
 
