@@ -47,7 +47,10 @@ class EnergyAccount:
         if not self.limited:
             return True
         made = self.work.tried(H)
-        return made <= 0.0 or made <= self._budget()
+        allowed = made <= 0.0 or made <= self._budget()
+        if not allowed:
+            self.work.forget()
+        return allowed
 
     def _budget(self) -> float:
         """Return the energy that may have been made by now, J."""
