@@ -15,7 +15,7 @@ from orchestrator.coupling.graph.graph import Graph, Node
 from orchestrator.coupling.graph.links import GraphError
 from orchestrator.coupling.stepping.bounds import Count, NonNegative, Positive, PositiveCount
 from orchestrator.coupling.stepping.free_response import FreeResponse, Past
-from orchestrator.coupling.stepping.implicit import Implicit
+from orchestrator.coupling.stepping.implicit import Implicit, Iterate
 from orchestrator.coupling.stepping.interpolation import Between, step_node
 from orchestrator.coupling.stepping.jacobian import OwnDerivatives
 from orchestrator.coupling.stepping.least_squares import LeastSquares
@@ -115,24 +115,33 @@ class InterfaceJacobian(Implicit):
         self.pieces = [_Piece(t, 0.0, self.x, [])]
         return super().step(t, H)
 
-    def _solve(
-        self, t: float, H: float, states: list[SavedState], report: StepReport, *, keep_best: bool
-    ) -> tuple[bool, float]:
-        """Iterate from the nearer of two beginnings: the polynomial through the loads, or the models' free responses."""
-        polynomial = self.predictor.predict(t + H / 2, self.x)
+    def _predicted(self, t: float, H: float, states: list[SavedState], report: StepReport) -> np.ndarray:
+        """Return the better of two beginnings: the polynomial through the loads, or the models' free responses."""
+        polynomial = super()._predicted(t, H, states, report)
         foreseen, record = None, self.records.setdefault(H, Record())
         if self.foresees:
             for model in self.models:
                 model.free.begin()
             foreseen = self._foreseen(t, H, polynomial, states) if record.asks_models else None
-        report.by_model, before = foreseen is not None, report.iterations
-        found = self._iterate(t, H, polynomial if foreseen is None else foreseen, states, self.tolerance, report)
-        record.note(by_model=report.by_model, residual=self.first_residual, iterations=report.iterations - before)
-        if found.converged:
-            self.x = found.x
-        elif keep_best:
-            self._hold(t, H, found.x, states, report)
-        return found.converged, found.residual
+        report.by_model = foreseen is not None
+        return polynomial if foreseen is None else foreseen
+
+    def _iterate(
+        self,
+        t: float,
+        H: float,
+        x: np.ndarray,
+        states: list[SavedState],
+        tolerance: float,
+        report: StepReport,
+        least: int = 1,
+    ) -> Iterate:
+        """Iterate, and remember how good the beginning was."""
+        before = report.iterations
+        found = super()._iterate(t, H, x, states, tolerance, report, least)
+        made = report.iterations - before
+        self.records[H].note(by_model=report.by_model, residual=self.first_residual, iterations=made)
+        return found
 
     def _foreseen(self, t: float, H: float, x: np.ndarray, states: list[SavedState]) -> np.ndarray | None:
         """Return the unknowns that meet the interface equation with the models' free responses; the rest alone is stepped.
@@ -167,9 +176,7 @@ class InterfaceJacobian(Implicit):
         if H in free.pulses or not lags or free.known(H) <= lags or t + (lags + 1) * H > stop:
             return
         if self.records[H].pays((lags + 1) * (node.torn + 1), (stop - t) / H):
-            values = x[model.unknowns]
-            steps = self.difference * np.maximum(np.abs(values), 1.0)
-            state = states[self.graph.nodes.index(node)]
+            state, values, steps = self._differences(model, x, states)
             model.jacobians[H] = free.measure(t, H, values, steps, state, self.between)
 
     def _accept(self, t: float, H: float) -> None:
@@ -215,9 +222,7 @@ class InterfaceJacobian(Implicit):
 
     def _differentiate(self, model: Model, t: float, H: float, x: np.ndarray, states: list[SavedState]) -> None:
         """Make the Jacobian of one component anew, and leave the component where it was."""
-        node, state = model.node, states[self.graph.nodes.index(model.node)]
-        values = x[model.unknowns]
-        steps = self.difference * np.maximum(np.abs(values), 1.0)
+        node, (state, values, steps) = model.node, self._differences(model, x, states)
 
         def respond(change: np.ndarray) -> np.ndarray:
             return self._response(node, state, t, H, values + change)
@@ -229,6 +234,13 @@ class InterfaceJacobian(Implicit):
             jacobian = np.stack([(respond(e) - base) for e in np.diag(steps)], axis=1) / steps
         node.fmu.restore(state)
         model.jacobians[H] = jacobian
+
+    def _differences(
+        self, model: Model, x: np.ndarray, states: list[SavedState]
+    ) -> tuple[SavedState, np.ndarray, np.ndarray]:
+        """Return what a component's answers are taken from: its state, its unknowns (m,), by how much each is changed (m,)."""
+        values = x[model.unknowns]
+        return states[self.graph.nodes.index(model.node)], values, self.difference * np.maximum(np.abs(values), 1.0)
 
     def _response(self, node: Node, state: SavedState, t: float, H: float, values: np.ndarray) -> np.ndarray:
         node.fmu.restore(state)

@@ -216,13 +216,17 @@ class Implicit(Master):
     ) -> tuple[bool, float]:
         """Iterate over one step; return whether it converged and the residual of the iterate the components
         are left at."""
-        x = self.predictor.predict(t + H / 2, self.x)
+        x = self._predicted(t, H, states, report)
         found = self._iterate(t, H, x, states, self.tolerance, report)
         if found.converged:
             self.x = found.x
         elif keep_best:
             self._hold(t, H, found.x, states, report)
         return found.converged, found.residual
+
+    def _predicted(self, t: float, H: float, states: list[SavedState], report: StepReport) -> np.ndarray:
+        """Return the unknowns that the iteration of a step begins with, (n,)."""
+        return self.predictor.predict(t + H / 2, self.x)
 
     def _iterate(
         self,
