@@ -322,6 +322,13 @@ def test_archives_that_are_none_are_refused(tmp_path, pack):
     assert "no such scenario file" in refused(tmp_path / "none.ssp")
 
 
+def test_archives_are_held_to_what_those_of_fmus_are(pack):
+    """The checks are those of `orchestrator.coupling.fmu.archive`; two of them stand for all."""
+    ssd = structure(system(mass("a")))
+    assert "one where case does not count" in refused(pack(ssd, **{"extra/A.txt": "x", "extra/a.txt": "y"}))
+    assert "both as a file and as a folder" in refused(pack(ssd, **{"extra": "x", "extra/a.txt": "y"}))
+
+
 # -- the engine: connections with a factor and an offset ----------------------------------------------------------------
 
 

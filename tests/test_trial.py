@@ -16,7 +16,7 @@ import pytest
 from orchestrator.catalogue.library import module_fmu, robot_fmu
 from orchestrator.catalogue.robot_spec import catalogue, load_robot
 from orchestrator.cli import commands as cli
-from orchestrator.coupling.fmu.description import sha256_of
+from orchestrator.coupling.fmu.archive import sha256_of
 from orchestrator.landing.trial import contact as contacts
 from orchestrator.landing.trial.answers import attitude
 from orchestrator.landing.trial.body import Body, Wrench

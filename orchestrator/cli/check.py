@@ -73,7 +73,7 @@ def check(
 def _tried(fmu: Path, kind: str, macro_step: float | None, limits: Limits, json: Path | None) -> int:
     """Put the FMU on trial, say what came of it, and return the exit status."""
     from orchestrator.coupling.errors import DONE, FAILED, MISSED
-    from orchestrator.coupling.fmu.description import sha256_of
+    from orchestrator.coupling.fmu.archive import sha256_of
     from orchestrator.coupling.run.results import write_json
     from orchestrator.landing.trial.dynamic import put_on_trial
     from orchestrator.landing.trial.remembered import remember

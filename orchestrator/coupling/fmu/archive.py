@@ -80,13 +80,13 @@ def _wrong(info: zipfile.ZipInfo) -> Iterator[str]:
     """Yield what keeps one file from being unpacked."""
     name, kind = info.orig_filename, S_IFMT(info.external_attr >> 16)
     if not name.strip("/") or name.startswith("/") or "\\" in name or ":" in name or ".." in name.split("/"):
-        yield "that does not lie within it (absolute, a drive, a backslash or ..); export the FMU anew"
+        yield "that does not lie within it (absolute, a drive, a backslash or ..); export it anew"
     if "\0" in name or any(len(part.encode("utf-8", "replace")) > LONGEST for part in name.split("/")):
-        yield "whose name no file can have; export the FMU anew"
+        yield "whose name no file can have; export it anew"
     if kind and not (S_ISREG(kind) or S_ISDIR(kind)):
-        yield "that is a link or a device; export the FMU anew with the file itself"
+        yield "that is a link or a device; export it anew with the file itself"
     if info.flag_bits & ENCRYPTED or info.compress_type not in METHODS:
-        yield f"that is encrypted, or packed by a method ({info.compress_type}) that FMUs do not use; pack it anew"
+        yield f"that is encrypted, or packed by a method ({info.compress_type}) that such files do not use; pack it anew"
 
 
 def _path(info: zipfile.ZipInfo) -> str:
@@ -101,11 +101,11 @@ def _meeting(infos: list[zipfile.ZipInfo]) -> Iterator[str]:
         other = known.setdefault(_folded(path), path)
         if other is not path:
             what = "twice" if other == path else f"and {other[:200]!r}, which are one where case does not count"
-            yield f"has {path[:200]!r} {what}; export the FMU anew"
+            yield f"has {path[:200]!r} {what}; export it anew"
     above = {_folded(parent) for info in infos for parent in _parents(_path(info), info.is_dir())}
     both = next((path for path in paths if _folded(path) in above), None)
     if both is not None:
-        yield f"has {both[:200]!r} both as a file and as a folder; export the FMU anew"
+        yield f"has {both[:200]!r} both as a file and as a folder; export it anew"
 
 
 def _folded(path: str) -> str:
@@ -122,7 +122,7 @@ def _overlapping(infos: list[zipfile.ZipInfo]) -> Iterator[str]:
     end, last = 0, ""
     for info in sorted(infos, key=lambda info: info.header_offset):
         if info.header_offset < end:
-            yield f"has files that overlap ({last[:200]!r} and {info.filename[:200]!r}); export the FMU anew"
+            yield f"has files that overlap ({last[:200]!r} and {info.filename[:200]!r}); export it anew"
             return
         end, last = info.header_offset + HEADER + info.compress_size, info.filename
 
@@ -135,7 +135,7 @@ def unpack(path: Path, folder: Path) -> Hashes:
             folder.mkdir()
             return {name: _unpacked(archive, info, folder / name) for name, info in found.items()}
     except (zipfile.BadZipFile, zlib.error, EOFError, NotImplementedError, RuntimeError) as error:
-        raise ArchiveError(f"its archive is damaged: {error}; export the FMU anew") from None
+        raise ArchiveError(f"its archive is damaged: {error}; export it anew") from None
 
 
 def _unpacked(archive: zipfile.ZipFile, info: zipfile.ZipInfo, target: Path) -> str:
@@ -149,7 +149,7 @@ def _unpacked(archive: zipfile.ZipFile, info: zipfile.ZipInfo, target: Path) -> 
     return digest.hexdigest()
 
 
-def hash_of(path: Path) -> str:
+def sha256_of(path: Path) -> str:
     """Return the SHA-256 of a file as hexadecimal digits."""
     with path.open("rb") as file:
         return hashlib.file_digest(file, "sha256").hexdigest()

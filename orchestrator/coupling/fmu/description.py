@@ -15,7 +15,7 @@ import fmpy
 import numpy as np
 from fmpy.model_description import ModelDescription, ModelVariable, ValidationError
 
-from orchestrator.coupling.fmu.archive import ArchiveError, files_of, hash_of
+from orchestrator.coupling.fmu.archive import ArchiveError, files_of, sha256_of
 from orchestrator.coupling.fmu.standard import (
     MOST_BYTES,
     DescriptionError,
@@ -133,11 +133,6 @@ def ports_of(variable: ModelVariable, structure: Structure = NO_STRUCTURE) -> li
     )
     relative = bool(variable.relativeQuantity)
     return [Port(name, variable.valueReference, *fixed, i, relative) for i, name in enumerate(names)]
-
-
-def sha256_of(path: Path) -> str:
-    """Return the SHA-256 of a file as hexadecimal digits."""
-    return hash_of(path)
 
 
 def parsed(path: Path) -> ModelDescription:

@@ -14,7 +14,7 @@ from itertools import count
 from pathlib import Path
 
 from orchestrator.coupling.cache import prune, remove, shrink, used, user_folder
-from orchestrator.coupling.fmu.archive import Hashes, hash_of, unpack
+from orchestrator.coupling.fmu.archive import Hashes, sha256_of, unpack
 from orchestrator.coupling.scratch import is_running, scratch
 
 KIND, HASHES, OWN = "unpacked", "unpacked-hashes", "instances"
@@ -57,7 +57,7 @@ def _is_whole(folder: Path) -> bool:
         return False
     with contextlib.suppress(OSError, ValueError):
         known: Hashes = json.loads(_hashes(folder).read_text(encoding="utf-8"))
-        return _there(folder) == known.keys() and all(hash_of(folder / name) == known[name] for name in known)
+        return _there(folder) == known.keys() and all(sha256_of(folder / name) == known[name] for name in known)
     return False
 
 

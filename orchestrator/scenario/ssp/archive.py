@@ -4,7 +4,6 @@ from __future__ import annotations
 
 import os
 import shutil
-import tempfile
 import zipfile
 from dataclasses import dataclass
 from pathlib import Path
@@ -12,7 +11,8 @@ from urllib.parse import unquote
 
 from orchestrator.coupling.cache import prune, used, user_folder
 from orchestrator.coupling.errors import InputError, nearest
-from orchestrator.coupling.fmu.description import sha256_of
+from orchestrator.coupling.fmu.archive import ArchiveError, files_of, sha256_of
+from orchestrator.coupling.scratch import scratch
 from orchestrator.scenario.ssp.names import DEFAULT_SSD, OSP_FILE
 from orchestrator.scenario.ssp.xml import is_inside
 
@@ -79,20 +79,23 @@ def _unpacked(path: Path) -> Path:
         return used(folder)
     except zipfile.BadZipFile as error:
         raise InputError(f"{path}: no SSP: {error}; export it anew") from None
+    except ArchiveError as error:
+        raise InputError(f"{path}: {error}") from None
     except (OSError, NotImplementedError, RuntimeError) as error:
         raise InputError(f"{path}: cannot be unpacked: {error}") from None
 
 
 def _unpack(path: Path, folder: Path) -> None:
-    with zipfile.ZipFile(path) as archive, tempfile.TemporaryDirectory(dir=folder.parent) as scratch:
+    with zipfile.ZipFile(path) as archive, scratch(folder.parent) as place:
         entries = [entry for entry in archive.infolist() if not entry.is_dir()]
         _require_bounded(path, entries)
+        files_of(archive)
         left = MOST_BYTES
         for entry in entries:
-            left = _write(archive, entry, Path(scratch, "all", entry.filename), left, path)
+            left = _write(archive, entry, Path(place, "all", entry.filename), left, path)
         if not entries:
             raise InputError(f"{path}: no SSP: the archive is empty; export it anew")
-        _move(Path(scratch, "all"), folder)
+        _move(Path(place, "all"), folder)
 
 
 def _move(made: Path, folder: Path) -> None:
