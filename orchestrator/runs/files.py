@@ -15,6 +15,7 @@ import numpy as np
 from orchestrator.coupling.errors import InputError, OrchestratorError
 from orchestrator.coupling.run.columns import Columns
 from orchestrator.coupling.run.results import Table, plain, read_fields, read_json, read_table
+from orchestrator.coupling.run.steps import KINDS
 from orchestrator.runs.compare import Comparison
 from orchestrator.runs.directory import RunDirectory, manifest
 from orchestrator.runs.going_on import FOLDER, keep_signals
@@ -24,8 +25,6 @@ FIELD_UNITS = {
     "time": "s", "arc_length": "m", "position": "m", "tension": "N",
     "node_arc_length": "m", "node_position": "m", "node_slope": "1", "tension_max": "N",
 }  # fmt: skip
-COUNTS = {"iterations": int, "subdivisions": int, "rejected": int, "columns": int, "by_model": bool, "converged": bool}
-"""Columns of ``iterations.csv`` that are no real numbers."""
 FMU_LOG = "fmu.log"
 Manifest = dict[str, Any]
 
@@ -198,5 +197,5 @@ def read_comparison(directory: Path) -> Comparison:
 
 def _counted(table: Table) -> Table:
     if isinstance(table, Columns):
-        return table.of_kinds({name: COUNTS[name] for name in table if name in COUNTS})
-    return {name: np.asarray(values, dtype=COUNTS.get(name, float)) for name, values in table.items()}
+        return table.of_kinds({name: KINDS[name] for name in table if name in KINDS})
+    return {name: np.asarray(values, dtype=KINDS.get(name, float)) for name, values in table.items()}
