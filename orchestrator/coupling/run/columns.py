@@ -35,8 +35,7 @@ class Rows:
         self.names = list(names)
         self.failure: Exception | None = None
         self.places = {name: place for place, name in enumerate(self.names)}
-        size = max(16, min(4096, PIECE // (8 * max(len(self.names), 1))))
-        self._open = np.empty((size, len(self.names)))
+        self._open = np.empty((_rows_of_a_piece(len(self.names)), len(self.names)))
         self._filled = self._written = self._done = 0  # rows of the open piece, of these on disk; rows of pieces
         self._held: list[np.ndarray] | None = None if held == 0 and path is not None else []
         self._most = HELD if held is None else held
@@ -196,12 +195,16 @@ class Columns(Mapping[str, np.ndarray]):
             yield {n: self._typed(n, piece[:, self.rows.places[stored]]) for n, stored in self.names.items()}
 
 
+def _rows_of_a_piece(columns: int) -> int:
+    return max(16, min(4096, PIECE // (8 * max(columns, 1))))
+
+
 def pieces_of(table: Mapping[str, np.ndarray]) -> Iterator[Mapping[str, np.ndarray]]:
     """Yield the rows of a table piece by piece."""
     if isinstance(table, Columns):
         yield from table.pieces()
         return
-    size = max(16, min(4096, PIECE // (8 * max(len(table), 1))))
+    size = _rows_of_a_piece(len(table))
     for first in range(0, max(map(len, table.values()), default=0), size):
         yield {name: values[first : first + size] for name, values in table.items()}
 
