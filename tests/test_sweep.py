@@ -219,10 +219,10 @@ def test_a_sweep_that_was_ended_goes_on_and_leaves_the_same_table(tmp_path: Path
         "2",
     ]
     with subprocess.Popen(line, stdout=subprocess.DEVNULL, stderr=subprocess.DEVNULL) as first:
-        while len(list(folder.glob("runs/*/manifest.json"))) < 3 and first.poll() is None:
+        while len(list(folder.glob("runs/[!.]*/manifest.json"))) < 3 and first.poll() is None:
             time.sleep(0.02)
         first.send_signal(number)
-    made = {path: path.stat().st_mtime_ns for path in folder.glob("runs/*/manifest.json")}
+    made = {path: path.stat().st_mtime_ns for path in folder.glob("runs/[!.]*/manifest.json")}
     assert 3 <= len(made) < 24
     if number == signal.SIGINT:
         assert not json.loads((folder / "study.json").read_text(encoding="utf-8"))["complete"]

@@ -57,6 +57,11 @@ def killed(process: subprocess.Popen, whole_group: bool) -> None:
     wait_until(lambda: not group_of(process.pid), 20.0)
 
 
+def manifests(out: Path) -> list[Path]:
+    """Those of the runs that are whole: a run that is being written stands in a hidden folder, which moves into place."""
+    return list(out.glob("runs/[!.]*/manifest.json"))
+
+
 def rows(out: Path) -> list[dict[str, str]]:
     with open(out / "table.csv", encoding="utf-8", newline="") as file:
         return list(csv.DictReader(file))
@@ -81,8 +86,8 @@ def require_only_the_faulty_failed(out: Path, count: int) -> None:
 def test_runs_that_crash_and_hang_cost_themselves_alone_though_the_sweep_is_killed(tmp_path: Path):
     study, out = study_in(tmp_path, 25, 2, PATIENCE), tmp_path / "out"
     first = started(study, out)
-    wait_until(lambda: len(list(out.glob("runs/*/manifest.json"))) >= 10 or first.poll() is not None, 120.0)
-    made = {path: path.stat().st_mtime_ns for path in out.glob("runs/*/manifest.json")}
+    wait_until(lambda: len(manifests(out)) >= 10 or first.poll() is not None, 120.0)
+    made = {path: path.stat().st_mtime_ns for path in manifests(out)}
     killed(first, whole_group=False)
     assert finished(study, out)[0] == 1
     assert {path: path.stat().st_mtime_ns for path in made} == made, "none is made twice"
@@ -118,7 +123,7 @@ def test_a_full_disk_costs_the_runs_in_flight_alone(tmp_path: Path):
     limited = f"ulimit -f 8; exec {sys.executable} -m orchestrator sweep {study} --out {out} --quiet --workers 1"
     ended = subprocess.run(["bash", "-c", limited], capture_output=True, text=True, check=False)
     assert ended.returncode == 3 and "make room" in ended.stderr and "Traceback" not in ended.stderr
-    made = {path: path.stat().st_mtime_ns for path in out.glob("runs/*/manifest.json")}
+    made = {path: path.stat().st_mtime_ns for path in manifests(out)}
     assert len(made) == 1 and not list(out.glob("runs/.*"))
     assert finished(study, out)[0] == 0 and len(rows(out)) == 2
     assert {path: path.stat().st_mtime_ns for path in made} == made, "none is made twice"
