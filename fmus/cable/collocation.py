@@ -79,7 +79,7 @@ def step(model, method, state, h, offset, ports, tolerance, ahead, work):
     Parameters
     ----------
     offset : start of the step relative to the middle of the macro step, s
-    ports : (N_PORTS, 13) s, force, moment, force rate, moment rate of each port
+    ports : (N_PORTS, 14) s, force, moment, force rate, moment rate, rate of s, of each port
     tolerance : m, of a coordinate
     ahead : s, negative: go on with the iteration matrix of the step before; else one is made for so much later
 

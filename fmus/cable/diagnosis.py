@@ -61,7 +61,7 @@ def diagnose(model, method, use_alpha, state, ports, out, rows, work):
 
     Parameters
     ----------
-    ports : (N_PORTS, 13), the loads of the macro step that has just been made
+    ports : (N_PORTS, 14), the loads of the macro step that has just been made
     out : (16,), receives tension left, mid, right, kinetic, elastic, gravitational and dissipated energy, force of the
         left support (3) and of the right one (3) on the cable, the energy dissipated by each kind of damping (3)
     rows : (m, 4), receives position and tension at equally spaced arc lengths

@@ -7,7 +7,7 @@ import numpy as np
 from fmus.cable import collocation as two_stage
 from fmus.cable import generalized_alpha
 from fmus.cable.diagnosis import diagnose
-from fmus.cable.ports import add_to_means, force_work, refusal, restart_means, show_step
+from fmus.cable.ports import add_to_means, force_work, move_on, refusal, restart_means, show_step
 from fmus.cable.state import LAST_INNER, LAST_MACRO, NOT_CONVERGED, OK
 from fmus.kernels.jit import kernel
 
@@ -30,7 +30,7 @@ def macro_step(model, collocation, alpha, use_alpha, state, h, longest, newton, 
 
     Parameters
     ----------
-    ports : (N_PORTS, 13), see ports.py
+    ports : (N_PORTS, 14), see ports.py; the places S move on by their rates
     shown : (N_PORTS, 22), receives motion, the time means of position and tangent over the macro step, and the work
     out, rows : see `diagnose`
 
@@ -38,11 +38,12 @@ def macro_step(model, collocation, alpha, use_alpha, state, h, longest, newton, 
     -------
     status : OK; NOT_CONVERGED, the state is then undefined; NOT_FINITE or OFF_CABLE, nothing is changed
     """
-    status = refusal(model, ports)
+    status = refusal(model, ports, h)
     if status != OK:
         return status
     sums, tolerance = state[4 * model.weight.size :], newton * max(1.0, model.s[-1] / 200.0)
-    restart_means(model, state, ports, work)
+    move_on(ports, 0.5 * h)
+    restart_means(model, state, ports, h, work)
     inner = h / max(1.0, np.ceil(h / longest - 1e-9))
     lag = alpha.alpha_m - alpha.alpha_f
     if use_alpha:
@@ -69,11 +70,12 @@ def macro_step(model, collocation, alpha, use_alpha, state, h, longest, newton, 
         fresh = abs(step - inner) > 1e-9 * inner
         copy(work.trial, state)
         elapsed += step
-        add_to_means(model, state, ports, step, h, work)
+        add_to_means(model, state, ports, step, elapsed - 0.5 * h, h, work)
     if use_alpha:
         generalized_alpha.end(model, state, ports, lag * sums[LAST_INNER] + 0.5 * h, work)
     force_work(ports, h, sums, work)
     sums[LAST_MACRO] = h
-    show_step(model, state, ports, shown, work)
     diagnose(model, collocation, use_alpha, state, ports, out, rows, work)
+    move_on(ports, 0.5 * h)
+    show_step(model, state, ports, shown, work)
     return OK

@@ -149,12 +149,15 @@ _OUTPUTS = (
 def _port(k: int) -> tuple[list[Variable], list[Variable]]:
     """Return the inputs and the outputs of port k, each in the order that the kernels use."""
     p = f"port[{k}]"
-    s = Variable(f"{p}.s", "input", "m", 0.0, "unstretched arc length of the contact point", discrete=True)
+    s = Variable(f"{p}.s", "input", "m", 0.0, "unstretched arc length of the contact point, at the start of a step", discrete=True)
     inputs = [s]
     inputs += vector(f"{p}.force", "input", "N", "force on the cable, mean over the macro step")
     inputs += vector(f"{p}.moment", "input", "N.m", "moment on the cable about the contact point, mean")
     inputs += vector(f"{p}.force_rate", "input", "N/s", "slope of the force within the macro step")
     inputs += vector(f"{p}.moment_rate", "input", "N.m/s", "slope of the moment within the macro step")
+    inputs.append(
+        Variable(f"{p}.s_rate", "input", "m/s", 0.0, "rate at which s moves on within the macro step", discrete=True)
+    )
     f = (f"{p}.s",)
     outputs = vector(f"{p}.position", "output", "m", "contact point on the centreline", feedthrough=f)
     outputs += vector(f"{p}.tangent", "output", "1", "dr/ds there, not normalised", feedthrough=f)
@@ -326,11 +329,12 @@ class Cable:
         if status == NOT_FINITE:
             return f"cable: an input at a port is not a finite number at t = {t:g} s"
         if status == OFF_CABLE:
-            arcs, length = self._ports[:, ports.S], self.model.s[-1]
-            k = int(np.argmax((arcs < 0.0) | (arcs > length)))
+            length = self.model.s[-1]
+            ends = self._ports[:, [ports.S]] + self._ports[:, [ports.S_RATE]] * [0.0, h]
+            k, i = np.argwhere((ends < 0.0) | (ends > length))[0]
             return (
-                f"cable: port[{k + 1}].s = {arcs[k]:g} m is off the cable (0 to {length:g} m) at "
-                f"t = {t:g} s: the wheel has run past a support; stop the run earlier, or brake the robot"
+                f"cable: port[{k + 1}].s = {ends[k, i]:g} m is off the cable (0 to {length:g} m) at "
+                f"t = {t + i * h:g} s: the wheel has run past a support; stop the run earlier, or brake the robot"
             )
         shortest = min(h, self["integration_step"]) / 2**dynamics.MAX_HALVINGS
         return (
@@ -345,10 +349,12 @@ class Cable:
     def show(self) -> None:
         """Write all outputs but means and work at the present state, whoever has put it there."""
         self.refresh()
-        self._diagnose(self._ports)
+        here = self._ports.copy()
+        here[:, ports.S_RATE] = 0.0  # they act where the ports stand now
+        self._diagnose(here)
 
     def _diagnose(self, loads: np.ndarray) -> None:
-        """Write tensions, energies, reactions and the shape; `loads` (N_PORTS, 13) act at the ports."""
+        """Write tensions, energies, reactions and the shape; `loads` (N_PORTS, 14) act at the ports."""
         diagnose(
             self.model,
             self._collocation,

@@ -81,7 +81,7 @@ def make_work(n: int, state_size: int) -> Work:
         trial=np.zeros(state_size),
         first=np.zeros((N_PORTS, 3)),
         power=np.zeros((2, N_LOSSES)),
-        means=np.zeros((N_PORTS, 6)),
+        means=np.zeros((N_PORTS, 9)),
     )
 
 

@@ -10,7 +10,16 @@ import math
 from fmus.contact import path as columns
 from fmus.contact import places as at
 from fmus.contact.law import LEFT, OK, SLIP, STEEP, foot, friction, walls
-from fmus.contact.path import hermite_path, motion_at, path_work, rotation_given, straight_path, waveform_path
+from fmus.contact.path import (
+    drift_along,
+    drift_work,
+    hermite_path,
+    motion_at,
+    path_work,
+    rotation_given,
+    straight_path,
+    waveform_path,
+)
 from fmus.contact.sampling import (
     passed_axle,
     point_law,
@@ -67,7 +76,7 @@ def write_instant(sample, outputs):
 @kernel
 def write_memory(state, outputs):
     """Write the outputs that the state remembers."""
-    outputs[at.O_ARC] = state[at.ARC]
+    outputs[at.O_ARC], outputs[at.O_ARC_RATE] = state[at.ARC], state[at.ARC_RATE]
     outputs[at.O_DISSIPATED] = state[at.DISSIPATED]
     outputs[at.O_WORK_CABLE] = state[at.WORK_CABLE]
     outputs[at.O_WORK_WHEEL] = state[at.WORK_WHEEL]
@@ -137,21 +146,52 @@ def _slip_since(inputs, state, start, rotation, slip):
 
 
 @kernel
-def step(prm, method, inputs, t, h, nodes, weights, increments, state, path, motions, samples, grid, way, outputs):
+def follow(moves, state, outputs, motion):
+    """Let the contact point move with the foot of its wheel in the step that begins, where it `moves` in steps.
+
+    Held for the step is the rate at its start, at which (p - w)·t stays zero: of the point p on the cable, at rest on the
+    material, and the wheel centre w; `motion` (24,) is work space.
+    """
+    state[at.ARC_RATE] = 0.0
+    if moves and state[at.SENT] == at.MOTION and state[at.GONE] == 0.0:
+        start_motion(state, motion)
+        along = square = 0.0
+        for i in range(3):
+            tangent, away = motion[at.TANGENT + i], motion[at.POINT + i] - motion[at.CENTRE + i]
+            along += (motion[at.POINT_RATE + i] - motion[at.CENTRE_RATE + i]) * tangent
+            along += away * motion[at.TANGENT_RATE + i]
+            square += tangent * tangent + away * state[at.LAST_CURVATURE + i]
+        if square > 0.0:  # else the wheel is beyond the centre of curvature: there is no foot
+            state[at.ARC_RATE] = -along / square
+    outputs[at.O_ARC_RATE] = state[at.ARC_RATE]
+
+
+@kernel
+def step(prm, method, moves, inputs, t, h, nodes, weights, increments, state, path, motions, samples, grid, way, outputs):
     """Advance the contact from t over one macro step h; the inputs hold the motion at its end and the means over it.
 
     Parameters
     ----------
     prm : (18,); method : 0 point, 1 waveform, 2 hermite; inputs : (45,); t, h : s
+    moves : whether the contact point moves within the step: the motion of the cable handed in is that of a moving point
     nodes, weights, increments : of `gauss_rule(m)`
-    state : (44,), advanced; outputs : (42,), written
-    path, motions, samples, grid : (2, 4, 15), (m + 3, 24), (m + 2, 34), (m + 5, 4) work space
+    state : (45,), advanced; outputs : (43,), written
+    path, motions, samples, grid : (2, 4, 21), (m + 3, 24), (m + 2, 34), (m + 5, 4) work space
     way : (1,) m, receives how far wheel and cable move relative to each other in the step
 
     Returns
     -------
     int, status of the law
     """
+    status = _step(prm, method, inputs, t, h, nodes, weights, increments, state, path, motions, samples, grid, way, outputs)
+    if status == OK:
+        follow(moves, state, outputs, motions[0])
+    return status
+
+
+@kernel
+def _step(prm, method, inputs, t, h, nodes, weights, increments, state, path, motions, samples, grid, way, outputs):
+    """Make a step, see `step`; how the contact point moves in the next is left open."""
     sent = what_is_sent(prm, inputs, state[at.SENT])
     if sent != at.MOTION or state[at.SENT] != at.MOTION:
         return _first_step(prm, inputs, t, h, sent, state, samples[0], outputs)
@@ -162,7 +202,7 @@ def step(prm, method, inputs, t, h, nodes, weights, increments, state, path, mot
     z, curvature = state[at.BRISTLE : at.BRISTLE + 2], inputs[at.CURVATURE : at.CURVATURE + 3]
     exchanged, inside = path[0], path[1]
     start_motion(state, start)
-    _rebuild(method, start, inputs, h, exchanged, inside)
+    _rebuild(method, start, inputs, h, state, exchanged, inside)
     if method == POINT:
         status, dissipated = point_law(prm, exchanged, h, start, end, z, state[at.SLIDES] != 0.0, last)
         if status == OK:
@@ -255,13 +295,15 @@ def _first_step(prm, inputs, t, h, sent, state, row, outputs):
 
 
 @kernel
-def _rebuild(method, start, inputs, h, exchanged, inside):
+def _rebuild(method, start, inputs, h, state, exchanged, inside):
     """Write the path on which work is exchanged, and that along which the law is looked at: for `point` the cubic
     through positions and velocities at both ends, else the same."""
+    along, curvature = state[at.ARC_RATE], state[at.LAST_CURVATURE : at.LAST_CURVATURE + 3]
     if method == WAVEFORM:
         waveform_path(start, inputs, inside)
     else:
-        hermite_path(start, inputs, h, inside)
+        hermite_path(start, inputs, h, along, curvature, inside)
+    drift_along(inside, along, curvature, inputs)
     if method == POINT:
         straight_path(start, inputs, h, exchanged)
         return
@@ -301,7 +343,7 @@ def _fallen_step(prm, inputs, h, state, row, outputs):
 @kernel
 def _work_on_cable(method, path, h, nodes, weights, motions, outputs):
     """Return the work on the cable (J): of the force on its point, and of the moment on its tangent."""
-    work = path_work(path, columns.POINT, h, outputs, at.O_CABLE)
+    work = path_work(path, columns.POINT, h, outputs, at.O_CABLE) - drift_work(path, h, outputs, at.O_CABLE)
     if method == POINT:
         motion_at(path, 0.5, h, motions[0])
         return work + tangent_work(motions[0], h, 0.0, outputs, at.O_CABLE)
@@ -317,6 +359,8 @@ def _remember(state, inputs, last, h):
     state[at.STORED] = last[at.WALL_ENERGY] + last[at.BRISTLE_ENERGY]
     state[at.SLIDES] = 1.0 if last[at.STATUS] == SLIP else 0.0
     state[at.SHIFT] = last[at.OFFSET] if state[at.GONE] == 0.0 else 0.0
+    for _ in range(2):  # as the cable's port does, to the last bit
+        state[at.ARC] += state[at.ARC_RATE] * (0.5 * h)
     state[at.ARC] += state[at.SHIFT]
     state[at.LAST_STEP] = h
     for i in range(at.MOTION_SIZE):

@@ -107,6 +107,14 @@ _PARAMETERS = [
         kind="string",
         choices=("point", "waveform", "hermite"),
     ),
+    Variable(
+        "moving_port",
+        "parameter",
+        "1",
+        False,
+        "the cable's port moves on by cable.s_rate within the step; else it stands at cable.s",
+        kind="boolean",
+    ),
 ]
 
 
@@ -154,7 +162,8 @@ def _outputs(motion: tuple[str, ...]) -> list[Variable]:
     return [
         *_wrench("cable", "cable.position", motion),
         *_wrench("wheel", "wheel.position", motion),
-        Variable("cable.s", "output", "m", 0.0, "arc length of the contact point", discrete=True),
+        Variable("cable.s", "output", "m", 0.0, "arc length of the contact point, at the start of a step", discrete=True),
+        Variable("cable.s_rate", "output", "m/s", 0.0, "rate of cable.s within the step that begins", discrete=True),
         real("normal_force", "N", "sum of the forces of both groove walls, not their resultant"),
         real("friction_force", "N", "magnitude of the friction force"),
         real("penetration", "m", "deepest penetration; negative: the gap"),
@@ -202,6 +211,7 @@ class Contact:
         self.check_parameters()
         self._prm = law_parameters(self.values, self.table)
         self._method = int(self._value("exchange"))
+        self._moves = bool(self._value("moving_port")) and self._method != exchange.POINT
         self._nodes, self._weights, self._increments = gauss_rule(SAMPLES)
         self._path = np.zeros((2, *PATH_SHAPE))
         self._motions = np.zeros((SAMPLES + 3, at.MOTION_SIZE))
@@ -216,8 +226,9 @@ class Contact:
         self.state[at.DEEPEST_MAX] = -math.inf
         self.state[at.TOUCH_TIME] = at.NOT_YET
         self.state[at.SENT] = exchange.what_is_sent(self._prm, inputs, at.MOTION)
-        self.refresh()
         outputs = self.values[self._OUTPUTS]
+        exchange.follow(self._moves, self.state, outputs, self._motions[0])
+        self.refresh()
         self.state[at.STORED] = outputs[at.O_STRAIN]
         self.state[at.NORMAL_MAX], self.state[at.DEEPEST_MAX] = outputs[at.O_NORMAL], outputs[at.O_DEEPEST]
         if outputs[at.O_NORMAL] > 0.0:
@@ -243,6 +254,7 @@ class Contact:
         status = exchange.step(
             self._prm,
             self._method,
+            self._moves,
             self.values[self._INPUTS],
             t,
             h,

@@ -1,7 +1,10 @@
 """The motion of cable and wheel inside a macro step, rebuilt from what is known of it.
 
-Everything is a polynomial in sigma = (tau - t) / h. A *path* (4, 15) holds the coefficients of 1, sigma, sigma^2,
+Everything is a polynomial in sigma = (tau - t) / h. A *path* (4, 21) holds the coefficients of 1, sigma, sigma^2,
 sigma^3, a column each. The equations stand in README.md of this folder.
+
+Where the cable point moves along the cable within the step, at the rate ds/dt, the path is that of the moving point; the
+material under it has a velocity that is less by the *drift* ds/dt dr/ds, and a rate of the tangent less by ds/dt d²r/ds².
 """
 
 from __future__ import annotations
@@ -13,7 +16,9 @@ from fmus.kernels.jit import kernel
 
 POINT, TANGENT, CENTRE, AXLE, ROTATION = 0, 3, 6, 9, 12
 """First columns of cable point, tangent, wheel centre, axle, and of the wheel's rotation since t."""
-PATH_SHAPE = (4, 15)
+DRIFT = 15
+"""First column of the cable point's drift, m/s, and three further that of the tangent's, 1/s."""
+PATH_SHAPE = (4, 21)
 
 VALUE = np.array([first + i for first in (at.POINT, at.TANGENT, at.CENTRE, at.AXLE) for i in range(3)])
 """Places in a motion of what stands in the first twelve columns."""
@@ -57,11 +62,22 @@ def rotation_given(inputs):
 
 
 @kernel
-def hermite_path(start, inputs, h, path):
-    """Rebuild the motion as cubics from positions and velocities at both ends."""
+def hermite_path(start, inputs, h, along, curvature, path):
+    """Rebuild the motion as cubics from positions and velocities at both ends.
+
+    Parameters
+    ----------
+    along : ds/dt of the cable point, m/s; curvature : (3,) at the start, 1/m
+    """
     for j in range(9):
         i, k = VALUE[j], RATE[j]
-        _cubic(path, j, start[i], inputs[i], h * start[k], h * inputs[k])
+        rate0, rate1 = start[k], inputs[k]
+        if j < TANGENT:
+            rate0, rate1 = rate0 + along * start[at.TANGENT + j], rate1 + along * inputs[at.TANGENT + j]
+        elif j < CENTRE:
+            rate0 += along * curvature[j - TANGENT]
+            rate1 += along * inputs[at.CURVATURE + j - TANGENT]
+        _cubic(path, j, start[i], inputs[i], h * rate0, h * rate1)
     given = rotation_given(inputs)
     for j in range(3):
         rate0, rate1 = _axle_rate(start, j), _axle_rate(inputs, j)
@@ -97,6 +113,32 @@ def straight_path(start, inputs, h, path):
 
 
 @kernel
+def drift_along(path, along, curvature, inputs):
+    """Write the drift of a path whose cable point moves at the rate `along`, m/s; `curvature` (3,) is that at the start.
+
+    Of the tangent the projection on linear functions is taken: the point's velocity then stays what the force's mean and
+    slope do work on. The curvature is linear between both ends.
+    """
+    for i in range(3):
+        a, b, c = path[1, TANGENT + i], path[2, TANGENT + i], path[3, TANGENT + i]
+        slope = a + b + 0.9 * c
+        path[0, DRIFT + i] = along * (path[0, TANGENT + i] + a / 2.0 + b / 3.0 + c / 4.0 - 0.5 * slope)
+        path[1, DRIFT + i] = along * slope
+        path[0, DRIFT + 3 + i] = along * curvature[i]
+        path[1, DRIFT + 3 + i] = along * (inputs[at.CURVATURE + i] - curvature[i])
+
+
+@kernel
+def drift_work(path, h, wrench, o):
+    """Return the work, J, that the force in `wrench` would do along the drift of its point."""
+    work = 0.0
+    for i in range(3):
+        slope = path[1, DRIFT + i]
+        work += wrench[o + i] * h * (path[0, DRIFT + i] + 0.5 * slope) + wrench[o + 6 + i] * h * h * slope / 12.0
+    return work
+
+
+@kernel
 def motion_at(path, sigma, h, motion):
     """Write the motion (24,) on a path."""
     for j in range(15):
@@ -106,6 +148,8 @@ def motion_at(path, sigma, h, motion):
             motion[VALUE[j]] = value
         if j < AXLE:
             motion[RATE[j]] = rate
+            if j < CENTRE:
+                motion[RATE[j]] -= path[0, DRIFT + j] + sigma * path[1, DRIFT + j]
         elif j >= ROTATION:
             motion[at.TURN_RATE + j - ROTATION] = rate
 

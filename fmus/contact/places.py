@@ -87,7 +87,7 @@ ROTATION_MEAN = 39
 CURVATURE = 42  # d²r/ds² of the cable at its point, 1/m
 INPUT_SIZE = 45
 
-# --- state of the module (44,)
+# --- state of the module (45,)
 LAST = 0  # motion at the last communication point, as it came in
 BRISTLE = 24  # two numbers, m: elongation
 ARC = 26  # one number, m: arc length of the contact point
@@ -106,15 +106,16 @@ SLIP_MAX = 40  # one number, m/s, while cable and wheel touch
 IMPULSE = 41  # one number, N s: of the normal force over the last macro step
 TOUCH_TIME = 42  # one number, s: of the first touch; NOT_YET before
 SENT = 43  # what came in at the last communication point: of the three below
-STATE_SIZE = 44
+ARC_RATE = 44  # one number, m/s: of the contact point's arc length within the step that begins
+STATE_SIZE = 45
 NOT_YET = -1.0
 MOTION, NOTHING, FAR = 0.0, 1.0, 2.0  # a motion; zeros; after zeros, one of a cable point far from the wheel
 
-# --- outputs of the module (42,)
+# --- outputs of the module (43,)
 O_CABLE = 0  # force, moment, force rate, moment rate on the cable
 O_WHEEL = 12
-O_ARC, O_NORMAL, O_FRICTION, O_DEEPEST, O_SLIP, O_LENGTH, O_STATUS = range(24, 31)
-O_DISSIPATED, O_STRAIN, O_WORK_CABLE, O_WORK_WHEEL = range(31, 35)
-O_RADIAL, O_LATERAL = 35, 36
-O_NORMAL_MAX, O_DEEPEST_MAX, O_SLIP_MAX, O_IMPULSE, O_TOUCH_TIME = range(37, 42)
-OUTPUT_SIZE = 42
+O_ARC, O_ARC_RATE, O_NORMAL, O_FRICTION, O_DEEPEST, O_SLIP, O_LENGTH, O_STATUS = range(24, 32)
+O_DISSIPATED, O_STRAIN, O_WORK_CABLE, O_WORK_WHEEL = range(32, 36)
+O_RADIAL, O_LATERAL = 36, 37
+O_NORMAL_MAX, O_DEEPEST_MAX, O_SLIP_MAX, O_IMPULSE, O_TOUCH_TIME = range(38, 43)
+OUTPUT_SIZE = 43

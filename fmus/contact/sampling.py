@@ -14,6 +14,11 @@ from fmus.contact.path import motion_at
 from fmus.kernels.jit import kernel
 
 
+FOOT_ITERATIONS = 6
+FOOT_ERROR = 1e-13
+"""m; each iteration shrinks the error by curvature times the wheel's distance, 1e-2 or less for a wheel on the cable."""
+
+
 def gauss_rule(n: int) -> tuple[np.ndarray, np.ndarray, np.ndarray]:
     """Return Gauss-Legendre nodes and weights on [0, 1] and the rule's integrals between the nodes.
 
@@ -175,15 +180,32 @@ def bend(motion, curvature):
     """Turn the straight cable of a motion into the tangent of the curved one, at the foot of the wheel.
 
     At the distance x of the foot from p the cable is at p + x t + x²/2 c and points along t + x c; the line through
-    that point is written as one through p - x²/2 c.
+    that point is written as one through p - x²/2 c. The foot is that on the bent line: x is iterated, for as long as it
+    comes nearer.
     """
     length, _u, offset, _d = foot(motion)
     x = offset / length
     if not math.isfinite(x):
         return  # the law says what is wrong
+    p0, p1, p2 = motion[at.POINT], motion[at.POINT + 1], motion[at.POINT + 2]
+    t0, t1, t2 = motion[at.TANGENT], motion[at.TANGENT + 1], motion[at.TANGENT + 2]
+    change = math.inf
+    for _ in range(FOOT_ITERATIONS):
+        _bent_at(x, (p0, p1, p2), (t0, t1, t2), curvature, motion)
+        length, _u, offset, _d = foot(motion)
+        step = offset / length - x
+        if not abs(step) < change or abs(step) < FOOT_ERROR:
+            break
+        x, change = x + step, abs(step)
+    _bent_at(x, (p0, p1, p2), (t0, t1, t2), curvature, motion)
+
+
+@kernel
+def _bent_at(x, p, t, curvature, motion):
+    """Write the line that touches the cable through p along t, with its `curvature`, at the distance x from p."""
     for i in range(3):
-        motion[at.POINT + i] -= 0.5 * x * x * curvature[i]
-        motion[at.TANGENT + i] += x * curvature[i]
+        motion[at.POINT + i] = p[i] - 0.5 * x * x * curvature[i]
+        motion[at.TANGENT + i] = t[i] + x * curvature[i]
 
 
 @kernel

@@ -76,6 +76,8 @@ EXPLICIT_ORDER = 1
 """Order of the error of an explicit master, at least, whatever the exchange."""
 PARAMETER = "exchange"
 """The FMU's parameter that chooses."""
+MOVING = "moving_port"
+"""The contact's parameter that says that the cable's port moves on within a step."""
 Choice = Literal["point", "hermite", "waveform"]
 """What can be asked for as a whole; `held` is left to FMUs whose own parameter has it."""
 
@@ -119,6 +121,8 @@ LOADS = {"force": Load("position"), "moment": Load("rotation", from_start=True)}
 """By the last part of a variable's name."""
 VELOCITIES = {"position": "velocity", "rotation": "angular_velocity"}
 """Motions whose rate has a name of its own; that of any other X is ``X_rate``."""
+ALONG = {"position": "tangent", "tangent": "curvature"}
+"""Motions of a place on a line, with what they change by along it, per unit of arc length."""
 FROM_START = tuple(load.motion for load in LOADS.values() if load.from_start)
 MOMENTS = ("moment", "torque")
 """Loads that act through a force at the same place and its lever."""
@@ -203,6 +207,16 @@ def rate_of(motion: str) -> str:
     """Return the name that the rate of a motion has, ``port[1].velocity.x`` for ``port[1].position.x``."""
     place, last, axis = split(motion)
     return f"{place}{VELOCITIES.get(last, last + RATE)}{axis}"
+
+
+def along(motion: str) -> tuple[str, str]:
+    """Return what a motion of a place changes by along the line that it is on, and the rate at which the place moves along.
+
+    ``port[1].tangent.x`` and ``port[1].s_rate`` for ``port[1].position.x``; empty for any other motion. The place is ``s`` at
+    the start of a step and ``s + s_rate h`` at its end; the rate of the motion, ``velocity``, is that of the material.
+    """
+    place, last, axis = split(motion)
+    return (f"{place}{ALONG[last]}{axis}", f"{place}s_rate") if last in ALONG else ("", "")
 
 
 def force_beside(moment: str) -> str:

@@ -9,6 +9,7 @@ from pathlib import Path
 from orchestrator.catalogue import library
 from orchestrator.coupling.exchange import (
     EXCHANGES,
+    MOVING,
     PARAMETER,
     Exchange,
     is_slope_of_load,
@@ -56,8 +57,10 @@ def landing_graph(landing: Landing, exchange: str) -> Graph:
         for fmu in components.values():  # the contract says so, whether or not a unit does
             fmu.declare(name for name in fmu.ports if is_slope_of_load(name))
         possible = _possible(EXCHANGES[exchange], components)
-        for fmu in _contacts(components).values():
+        for name, fmu in _contacts(components).items():
             fmu.set_parameters({PARAMETER: possible.name})
+            if MOVING in fmu.ports:
+                fmu.set_parameters({MOVING: possible.slopes and _moves_along(components, name)})
         inputs = {f"robot.{name}": course for name, course in landing.robot.courses.items()}
         return Graph(components, _kept(_connections(components), possible), order=tuple(components), inputs=inputs)
     except BaseException:
@@ -105,6 +108,12 @@ def _possible(exchange: Exchange, components: Mapping[str, Fmu]) -> Exchange:
     for lacks in lacking(components):
         exchange = lacks.best(exchange)
     return exchange
+
+
+def _moves_along(components: Mapping[str, Fmu], contact: str) -> bool:
+    """Return whether the cable can move a contact's port within a step, and shows what the contact needs for that."""
+    port, ports = f"port[{contact.removeprefix('contact')}]", components["cable"].ports
+    return f"{port}.s_rate" in ports and f"{port}.curvature.x" in ports
 
 
 def _connections(components: Mapping[str, Fmu]) -> list[Connection]:

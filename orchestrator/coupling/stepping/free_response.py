@@ -6,7 +6,7 @@ The outputs at the end of step n are taken as
 
 with x the step's own unknowns (loads) and y₀ what the component shows at its start:
 
-- K: what positions and their time means do at constant velocity;
+- K: what positions and their time means do at constant velocity, of their place along a line included;
 - J, G_j: the response to a load in the step itself, and j steps later, of what K does not explain;
 - e: the rest, that neither explains, extrapolated from the last steps by a polynomial.
 
@@ -20,7 +20,7 @@ from math import comb
 
 import numpy as np
 
-from orchestrator.coupling.exchange import MEAN, base_of, is_from_start, rate_of
+from orchestrator.coupling.exchange import MEAN, along, base_of, is_from_start, rate_of
 from orchestrator.coupling.fmu.binding import SavedState
 from orchestrator.coupling.graph.graph import Node
 from orchestrator.coupling.stepping.interpolation import Between, step_node
@@ -67,9 +67,11 @@ class FreeResponse:
         self.node, self.memory = node, memory
         names, ports = node.outputs.names, node.fmu.ports
         moved = [base_of(name, MEAN) or name for name in names]
-        read = [*names, *(n for n in moved if not is_from_start(n)), *map(rate_of, moved)]
+        drifts = [name for motion in moved for name in along(motion)]
+        read = [*names, *(n for n in moved if not is_from_start(n)), *map(rate_of, moved), *drifts]
         self.read = node.fmu.group([n for n in dict.fromkeys(read) if n in ports and n in node.fmu.vocabulary])
         self.still, self.moving = _kinematics(names, self.read.names)
+        self.drift = _drifts(moved, self.read.names)
         self.reset()
 
     def reset(self) -> None:
@@ -79,8 +81,15 @@ class FreeResponse:
 
     def begin(self) -> None:
         """Read what is needed at the start of a step."""
+        self.start = self._seen()
+
+    def _seen(self) -> np.ndarray:
+        """Return what is read of the component now, (n_read,); rates of what moves along a line are those of its place."""
         self.read.get_finite()
-        self.start = self.read.values.copy()
+        seen = self.read.values.copy()
+        rate, slope, speed = self.drift
+        seen[rate] += seen[slope] * seen[speed]
+        return seen
 
     def lags(self, H: float) -> int:
         """Return L, the number of steps of length `H` that a load is remembered."""
@@ -137,8 +146,7 @@ class FreeResponse:
             step_node(between, node, t + j * H, H)
             rows.append(node.outputs.values - self._coasted(start, H))
             between.start_values[own] = ends
-            self.read.get_finite()
-            start = self.read.values.copy()
+            start = self._seen()
         return np.array(rows)
 
     def joined(self, first: Past, second: Past, x: np.ndarray) -> Past:
@@ -156,6 +164,14 @@ class FreeResponse:
     def _coasted(self, start: np.ndarray, H: float) -> np.ndarray:
         """Return the outputs after `H` at constant velocity, (n_y,)."""
         return self.still @ start + H * (self.moving @ start)
+
+
+def _drifts(motions: list[str], read: tuple[str, ...]) -> np.ndarray:
+    """Return where, in what is read, rates of motions along a line, their slopes along it and the speeds stand, (3, m) int."""
+    place = {name: i for i, name in enumerate(read)}
+    triples = dict.fromkeys((rate_of(motion), *along(motion)) for motion in motions)
+    rows = [[place[name] for name in triple] for triple in triples if all(name in place for name in triple)]
+    return np.array(rows, dtype=np.intp).reshape(-1, 3).T
 
 
 def _kinematics(names: tuple[str, ...], read: tuple[str, ...]) -> tuple[np.ndarray, np.ndarray]:
