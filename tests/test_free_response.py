@@ -2,11 +2,14 @@
 
 from __future__ import annotations
 
+from types import SimpleNamespace
+
 import numpy as np
 import pytest
 
 from orchestrator.api import load_scenario
 from orchestrator.coupling.exchange import rate_of
+from orchestrator.coupling.masters.interface_jacobian import InterfaceJacobian
 from orchestrator.coupling.stepping import free_response
 from orchestrator.coupling.stepping.free_response import FreeResponse, Past
 from orchestrator.coupling.stepping.record import PROBE, Record
@@ -145,6 +148,15 @@ def test_the_better_beginning_is_chosen_and_the_other_tried_ever_more_rarely():
     assert tried[1] - tried[0] >= PROBE
 
 
+def test_steps_in_the_air_say_nothing_of_either():
+    """Nothing acts, both foretell it exactly: fifteen digits that would count for as many steps after the touch."""
+    record = Record()
+    for by_model in (False, True, True):
+        record.note(by_model=by_model, residual=0.0, iterations=1)
+    assert np.isnan(record.model) and np.isnan(record.polynomial)
+    assert record.asks_models
+
+
 def test_pulses_are_made_where_they_pay():
     record = Record()
     for _ in range(50):
@@ -179,6 +191,26 @@ def test_the_beginning_changes_nothing_but_the_solves(beginnings):
     relative 1e-6 of the motion, times the few periods of the contact's vibration that it lives on."""
     a, b = (run.table["robot.body.position.z"] for run in beginnings.values())
     assert np.max(np.abs(a - b)) < 1e-5 * np.ptp(b)
+
+
+@pytest.mark.parametrize(
+    ("stiffness", "macro_step", "most"), [(1e8, 0.01, 3.44), (1e10, 0.005, 2.82), (1e10, 0.01, 3.60)]
+)
+def test_hard_drops_cost_no_more_solves_than_before_there_were_models(stiffness: float, macro_step: float, most: float):
+    """Expected: the solves of the polynomial alone at a tolerance of 1e-6 (docs/notebook/masters.md), all that is tried and
+    measured on the way included."""
+    hard = {"contact.parameters.stiffness": stiffness}
+    log = run_coupled(load_scenario("drop_5cm", stop=1.0, macro_step=macro_step, set=hard)).log
+    assert log.solves["cable"] / len(log.steps) <= most
+    assert not log.unconverged
+
+
+def test_an_iteration_that_ends_soon_gets_no_new_jacobian():
+    """Expected: three more iterations by a factor of 1e-2 each take 1e-3 below 3e-6; by 0.5 each they do not."""
+    master = SimpleNamespace(max_iterations=10, outer=7, tolerance=3e-6)
+    assert InterfaceJacobian._ends_soon(master, 1e-3, 1e-2)
+    assert not InterfaceJacobian._ends_soon(master, 1e-3, 0.5)
+    assert not InterfaceJacobian._ends_soon(master, 1e-3, 1e200)
 
 
 def test_iterations_say_which_beginning_it_was(beginnings):

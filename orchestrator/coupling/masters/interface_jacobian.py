@@ -39,7 +39,7 @@ class InterfaceJacobian(Implicit):
     back and stepping the rest alone, by a quasi-Newton iteration whose columns are reused. J comes from
     the FMU's directional derivatives where they foretell a step (`OwnDerivatives`), else from differences with
     rollback, once for each length of step, and is corrected after every outer iteration (Broyden's update,
-    which meets the last difference); it is made anew only when convergence slows.
+    which meets the last difference); it is made anew only when convergence slows, once a step.
 
     Order and stability: those of the exchange. When: the default for contact. Cost: about two steps of the
     modelled components a macro step. Reference: Sicklinger et al., Int. J. Numer. Methods Eng. 98 (2014)
@@ -49,7 +49,7 @@ class InterfaceJacobian(Implicit):
     ----------
     reuse : macro steps whose columns the inner iteration keeps, those of all its solves in a step
     difference : step of the differences, relative to the magnitude of the unknown (at least 1 in its unit)
-    slow : outer iterations after which J is made anew
+    slow : outer iterations after which J is made anew, unless the last one shows that the tolerance is near
     inner_tolerance : residual of the inner iteration, relative to `tolerance`
     inner_iterations : at most
     max_iterations : outer ones before the step is sub-divided; where the linear models fail, halves cost less, and an
@@ -218,7 +218,7 @@ class InterfaceJacobian(Implicit):
             model.last = None
             if H not in model.jacobians:
                 self._differentiate(model, t, H, x, states)
-        self.outer, self.last = 0, np.inf
+        self.outer, self.last, self.anew = 0, np.inf, False
 
     def _differentiate(self, model: Model, t: float, H: float, x: np.ndarray, states: list[SavedState]) -> None:
         """Make the Jacobian of one component anew, and leave the component where it was."""
@@ -254,13 +254,18 @@ class InterfaceJacobian(Implicit):
             model.learn(H, x, self.scale.values)
         self.outer += 1
         residual = self.scale.norm(r, x, H)
-        if self.last < np.inf:
-            self.contraction = 0.5 * (self.contraction + min(residual / self.last, WORST))
-        self.last = residual
-        if self.outer == self.slow:
+        shrunk, self.last = residual / self.last, residual
+        if shrunk > 0.0:
+            self.contraction = 0.5 * (self.contraction + min(shrunk, WORST))
+        if self.outer >= self.slow and not self.anew and not self._ends_soon(residual, shrunk):
+            self.anew = True
             for model in self.models:
                 self._differentiate(model, t, H, x, states)
         return self._solve_interface(t, H, x, r, residual, states)[0]
+
+    def _ends_soon(self, residual: float, shrunk: float) -> bool:
+        """Return whether the iteration will be below the tolerance in time if it goes on as it has last `shrunk`."""
+        return residual * min(shrunk, 1.0) ** (self.max_iterations - self.outer) <= self.tolerance
 
     def trial(
         self, t: float, H: float, x: np.ndarray, tolerance: float, enough: Callable[[], bool], report: StepReport

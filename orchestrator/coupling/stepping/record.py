@@ -48,6 +48,8 @@ class Record:
         """Remember the residual that a step began with, and the iterations it took."""
         self.steps += 1
         self.iterations = FORGET * self.iterations + (1.0 - FORGET) * iterations
+        if residual <= LEAST:  # in the air there is nothing to foretell: good for both, and soon no longer true
+            return
         digits = float(np.log10(np.clip(residual, LEAST, LARGEST)))
         if not by_model:
             self.polynomial = _faded(self.polynomial, digits)
