@@ -11,7 +11,7 @@ from scipy.spatial.transform import Rotation
 from fmus.contact import places as at
 from fmus.contact.law import LEFT, OPEN, SLIP, STICK, contact_wrench
 from fmus.contact.module import Contact
-from fmus.contact.path import motion_at, waveform_path
+from fmus.contact.path import PATH_SHAPE, motion_at, waveform_path
 from fmus.contact.sampling import gauss_rule, sample_law
 from fmus.module.variables import ModuleError
 
@@ -84,7 +84,7 @@ def rigid_inputs(rng, size=1e-3):
 def sampled(contact, start, inputs, h, m=8):
     """The law on the waveform path: nodes, weights, motions, samples, dissipation, stored energy before."""
     nodes, weights, increments, motions, samples = rule(m)
-    path = np.zeros((4, 15))
+    path = np.zeros(PATH_SHAPE)
     waveform_path(start, inputs, path)
     end, first, z = np.zeros(24), np.zeros(at.OUT_SIZE), np.zeros(2)
     motion_at(path, 1.0, h, end)

@@ -147,6 +147,9 @@ class Impulses:
         self.angular = {body: np.zeros(3) for body in self.places}
         self.largest = 0.0
 
+    def departs(self):
+        pass
+
     def __call__(self, t, h):
         for body, places in self.places.items():
             force, moment = self.graph.u[places]

@@ -31,7 +31,7 @@ def macro_step(model, collocation, alpha, use_alpha, state, h, longest, newton, 
     Parameters
     ----------
     ports : (N_PORTS, 14), see ports.py; the places S move on by their rates
-    shown : (N_PORTS, 22), receives motion, the time means of position and tangent over the macro step, and the work
+    shown : (N_PORTS, 25), receives motion, the time means of position and tangent over the macro step, and the work
     out, rows : see `diagnose`
 
     Returns
@@ -77,5 +77,5 @@ def macro_step(model, collocation, alpha, use_alpha, state, h, longest, newton, 
     sums[LAST_MACRO] = h
     diagnose(model, collocation, use_alpha, state, ports, out, rows, work)
     move_on(ports, 0.5 * h)
-    show_step(model, state, ports, shown, work)
+    show_step(model, state, ports, h, shown, work)
     return OK

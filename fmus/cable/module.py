@@ -149,7 +149,14 @@ _OUTPUTS = (
 def _port(k: int) -> tuple[list[Variable], list[Variable]]:
     """Return the inputs and the outputs of port k, each in the order that the kernels use."""
     p = f"port[{k}]"
-    s = Variable(f"{p}.s", "input", "m", 0.0, "unstretched arc length of the contact point, at the start of a step", discrete=True)
+    s = Variable(
+        f"{p}.s",
+        "input",
+        "m",
+        0.0,
+        "unstretched arc length of the contact point, at the start of a step",
+        discrete=True,
+    )
     inputs = [s]
     inputs += vector(f"{p}.force", "input", "N", "force on the cable, mean over the macro step")
     inputs += vector(f"{p}.moment", "input", "N.m", "moment on the cable about the contact point, mean")
@@ -169,6 +176,7 @@ def _port(k: int) -> tuple[list[Variable], list[Variable]]:
     outputs += vector(f"{p}.tangent_mean", "output", "1", f"time mean of tangent {over}", feedthrough=f)
     outputs.append(Variable(f"{p}.work", "output", "J", 0.0, "work done on the cable through this port"))
     outputs += vector(f"{p}.curvature", "output", "1/m", "d²r/ds² there", feedthrough=f)
+    outputs += vector(f"{p}.tangent_rate_mean", "output", "1/s", f"time mean of tangent_rate {over}")
     return inputs, outputs
 
 

@@ -13,9 +13,12 @@ from fmus.kernels.jit import kernel
 S, FORCE, MOMENT, FORCE_RATE, MOMENT_RATE, S_RATE = 0, 1, 4, 7, 10, 13
 N_INPUTS = 14
 
-# Places in a row of what is shown (N_PORTS, 22): position, tangent, velocity, tangent rate; then
-MEANS, PORT_WORK, CURVATURE = 12, 18, 19
-N_SHOWN = 22
+# Places in a row of what is shown (N_PORTS, 25): position, tangent, velocity, tangent rate; then
+MEANS, PORT_WORK, CURVATURE, TURN = 12, 18, 19, 22
+N_SHOWN = 25
+# Places in a row of the means in the workspace (N_PORTS, 12): position, tangent; then, as integrals over the macro step,
+# the tangent's moment about its middle, and the material's rate of the tangent.
+TILT, TURNED = 6, 9
 
 
 @kernel
@@ -60,10 +63,13 @@ def port_loads(model, q, ports, offset, work):
 
 @kernel
 def moment_work(model, q, v, ports, offset, weight, sums, work):
-    """Add to the work of each port what its moment does: `weight` times the power at a stage."""
+    """Add to the work of each port what its moment does: `weight` times the power at a stage.
+
+    Of a port that moves along, the material's rate of the tangent is added up besides.
+    """
     for k in range(N_PORTS):
         moment = work.load[1]
-        loaded = False
+        loaded = ports[k, S_RATE] != 0.0
         for i in range(3):
             moment[i] = ports[k, MOMENT + i] + ports[k, MOMENT_RATE + i] * offset
             loaded = loaded or moment[i] != 0.0
@@ -78,6 +84,8 @@ def moment_work(model, q, v, ports, offset, weight, sums, work):
         power += moment[1] * (g[2] * gd[0] - g[0] * gd[2])
         power += moment[2] * (g[0] * gd[1] - g[1] * gd[0])
         sums[WORK + k] += weight * power / square
+        for i in range(3):
+            work.means[k, TURNED + i] += weight * gd[i]
 
 
 @kernel
@@ -110,7 +118,7 @@ def restart_means(model, state, ports, h, work):
     work.means[:, :] = 0.0
     for k in range(N_PORTS):
         _moving_motion(model, state, ports, k, -0.5 * h, work, work.start[k])
-        for i in range(3):
+        for i in range(6):
             work.first[k, i] = work.start[k, i]
 
 
@@ -130,7 +138,7 @@ def add_to_means(model, state, ports, step, end, h, work):
             work.means[k, i] += mean * step / h
             if i >= 3:
                 tilt = (point[i] - start[i]) / 10.0 - step / 120.0 * (start[6 + i] + point[6 + i])
-                work.means[k, 3 + i] += step * (mean * (end - 0.5 * step) + step * tilt)
+                work.means[k, TILT + i - 3] += step * (mean * (end - 0.5 * step) + step * tilt)
         for i in range(12):
             start[i] = point[i]
 
@@ -147,24 +155,27 @@ def force_work(ports, h, sums, work):
             force, rate, along = ports[k, FORCE + i], ports[k, FORCE_RATE + i], ports[k, S_RATE]
             first, end = work.first[k, i], work.start[k, i]
             way = end - first - along * h * work.means[k, 3 + i]
-            tilt = h * (0.5 * (first + end) - work.means[k, i]) - along * work.means[k, 6 + i]
+            tilt = h * (0.5 * (first + end) - work.means[k, i]) - along * work.means[k, TILT + i]
             sums[WORK + k] += force * way + rate * tilt
 
 
 @kernel
 def show_ports(model, state, ports, shown, work):
-    """Write position, tangent, velocity, tangent rate and d²r/ds² of every port to `shown` (N_PORTS, 22)."""
+    """Write position, tangent, velocity, tangent rate and d²r/ds² of every port to `shown` (N_PORTS, 25)."""
     n = model.weight.size
     for k in range(N_PORTS):
         port_motion(model, state, ports[k, S], work.shape, shown[k, 0:MEANS])
-        curvature(model, state[:n], ports[k, S], work.shape, shown[k, CURVATURE:N_SHOWN])
+        curvature(model, state[:n], ports[k, S], work.shape, shown[k, CURVATURE:TURN])
 
 
 @kernel
-def show_step(model, state, ports, shown, work):
-    """Write what is shown of every port after a macro step: motion, time means, work."""
+def show_step(model, state, ports, h, shown, work):
+    """Write what is shown of every port after a macro step `h`: motion, time means, work."""
     show_ports(model, state, ports, shown, work)
     for k in range(N_PORTS):
         for i in range(6):
             shown[k, MEANS + i] = work.means[k, i]
+        for i in range(3):
+            turned = work.means[k, TURNED + i] if ports[k, S_RATE] != 0.0 else shown[k, 3 + i] - work.first[k, 3 + i]
+            shown[k, TURN + i] = turned / h
         shown[k, PORT_WORK] = state[4 * model.weight.size + WORK + k]

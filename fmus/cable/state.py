@@ -79,9 +79,9 @@ def make_work(n: int, state_size: int) -> Work:
         point=np.zeros((2, 6)),
         start=np.zeros((N_PORTS, 12)),
         trial=np.zeros(state_size),
-        first=np.zeros((N_PORTS, 3)),
+        first=np.zeros((N_PORTS, 6)),
         power=np.zeros((2, N_LOSSES)),
-        means=np.zeros((N_PORTS, 9)),
+        means=np.zeros((N_PORTS, 12)),
     )
 
 

@@ -167,12 +167,14 @@ def follow(moves, state, outputs, motion):
 
 
 @kernel
-def step(prm, method, moves, inputs, t, h, nodes, weights, increments, state, path, motions, samples, grid, way, outputs):
+def step(
+    prm, method, moves, inputs, t, h, nodes, weights, increments, state, path, motions, samples, grid, way, outputs
+):
     """Advance the contact from t over one macro step h; the inputs hold the motion at its end and the means over it.
 
     Parameters
     ----------
-    prm : (18,); method : 0 point, 1 waveform, 2 hermite; inputs : (45,); t, h : s
+    prm : (18,); method : 0 point, 1 waveform, 2 hermite; inputs : (48,); t, h : s
     moves : whether the contact point moves within the step: the motion of the cable handed in is that of a moving point
     nodes, weights, increments : of `gauss_rule(m)`
     state : (45,), advanced; outputs : (43,), written
@@ -183,7 +185,9 @@ def step(prm, method, moves, inputs, t, h, nodes, weights, increments, state, pa
     -------
     int, status of the law
     """
-    status = _step(prm, method, inputs, t, h, nodes, weights, increments, state, path, motions, samples, grid, way, outputs)
+    status = _step(
+        prm, method, inputs, t, h, nodes, weights, increments, state, path, motions, samples, grid, way, outputs
+    )
     if status == OK:
         follow(moves, state, outputs, motions[0])
     return status
@@ -303,7 +307,7 @@ def _rebuild(method, start, inputs, h, state, exchanged, inside):
         waveform_path(start, inputs, inside)
     else:
         hermite_path(start, inputs, h, along, curvature, inside)
-    drift_along(inside, along, curvature, inputs)
+    drift_along(inside, h, along, curvature, inputs)
     if method == POINT:
         straight_path(start, inputs, h, exchanged)
         return

@@ -139,6 +139,7 @@ def _inputs() -> list[Variable]:
         *rows("wheel.rotation", "rad", "integral of the wheel's angular velocity over the macro step"),
         *rows("wheel.rotation_mean", "rad", "time mean of that running integral"),
         *rows("cable.curvature", "1/m", "d²r/ds² of the cable at cable.s; zero: it counts as straight"),
+        *rows("cable.tangent_rate_mean", "1/s", "time mean of cable.tangent_rate over the macro step, for moving_port"),
     ]
 
 
@@ -162,7 +163,9 @@ def _outputs(motion: tuple[str, ...]) -> list[Variable]:
     return [
         *_wrench("cable", "cable.position", motion),
         *_wrench("wheel", "wheel.position", motion),
-        Variable("cable.s", "output", "m", 0.0, "arc length of the contact point, at the start of a step", discrete=True),
+        Variable(
+            "cable.s", "output", "m", 0.0, "arc length of the contact point, at the start of a step", discrete=True
+        ),
         Variable("cable.s_rate", "output", "m/s", 0.0, "rate of cable.s within the step that begins", discrete=True),
         real("normal_force", "N", "sum of the forces of both groove walls, not their resultant"),
         real("friction_force", "N", "magnitude of the friction force"),
@@ -199,7 +202,7 @@ class Contact:
     NAME = "contact"
     TITLE = "contact of a grooved wheel with a cable"
     table = _table()
-    _INPUTS = slice(table.index["cable.position.x"], table.index["cable.curvature.z"] + 1)
+    _INPUTS = slice(table.index["cable.position.x"], table.index["cable.tangent_rate_mean.z"] + 1)
     _OUTPUTS = slice(table.index["cable.force.x"], table.index["touch_time"] + 1)
 
     def __init__(self) -> None:

@@ -113,19 +113,22 @@ def straight_path(start, inputs, h, path):
 
 
 @kernel
-def drift_along(path, along, curvature, inputs):
+def drift_along(path, h, along, curvature, inputs):
     """Write the drift of a path whose cable point moves at the rate `along`, m/s; `curvature` (3,) is that at the start.
 
     Of the tangent the projection on linear functions is taken: the point's velocity then stays what the force's mean and
-    slope do work on. The curvature is linear between both ends.
+    slope do work on. The tangent's own drift is linear, too, with the mean that leaves the mean of its rate: a curvature
+    that jumps within the step, where elements meet, is counted by what it does.
     """
     for i in range(3):
         a, b, c = path[1, TANGENT + i], path[2, TANGENT + i], path[3, TANGENT + i]
         slope = a + b + 0.9 * c
         path[0, DRIFT + i] = along * (path[0, TANGENT + i] + a / 2.0 + b / 3.0 + c / 4.0 - 0.5 * slope)
         path[1, DRIFT + i] = along * slope
-        path[0, DRIFT + 3 + i] = along * curvature[i]
-        path[1, DRIFT + 3 + i] = along * (inputs[at.CURVATURE + i] - curvature[i])
+        bend = along * (inputs[at.CURVATURE + i] - curvature[i])
+        mean = (a + b + c) / h - inputs[at.TURN_MEAN + i] if along != 0.0 else 0.0
+        path[0, DRIFT + 3 + i] = mean - 0.5 * bend
+        path[1, DRIFT + 3 + i] = bend
 
 
 @kernel

@@ -80,12 +80,13 @@ LATERAL = 28  # one number, N: of both walls on the wheel, along its axle
 SCRATCH = 29  # from here on free for whoever calls the law
 OUT_SIZE = 34
 
-# --- inputs of the module (45,): the motion at the end of the macro step, then
+# --- inputs of the module (48,): the motion at the end of the macro step, then
 MEANS = 24  # time means of point, tangent, centre and axle
 ROTATION = 36  # of the wheel over the macro step, rad
 ROTATION_MEAN = 39
 CURVATURE = 42  # d²r/ds² of the cable at its point, 1/m
-INPUT_SIZE = 45
+TURN_MEAN = 45  # time mean of the tangent's rate, 1/s
+INPUT_SIZE = 48
 
 # --- state of the module (45,)
 LAST = 0  # motion at the last communication point, as it came in

@@ -46,6 +46,7 @@ def _scalar(name: str, causality: Causality, unit: str, needed: bool = True, use
 INSIDE = "for what happens within a macro step"
 CONTROL = "for controlled landings"
 """Use of inputs that are zero where nobody controls."""
+ROLLS = "for a wheel that rolls along the cable"
 ENERGY_CONJUGATE = f"for {PARAMETER} = {suited_to(implicit=True)}"
 
 ROBOT = (
@@ -80,6 +81,7 @@ ROBOT = (
 )
 CABLE = (
     _scalar("port[k].s", "input", "m"),
+    _scalar("port[k].s_rate", "input", "m/s", False, ROLLS),
     Point("port[k].force", "input", "N"),
     Point("port[k].moment", "input", "N.m"),
     Point("port[k].force_rate", "input", "N/s", False, use=ENERGY_CONJUGATE),
@@ -90,7 +92,8 @@ CABLE = (
     Point("port[k].tangent_rate", "output", "1/s"),
     Point("port[k].position_mean", "output", "m", False, use=ENERGY_CONJUGATE),
     Point("port[k].tangent_mean", "output", "1", False, use=ENERGY_CONJUGATE),
-    Point("port[k].curvature", "output", "1/m", False, use="for a wheel that rolls along the cable"),
+    Point("port[k].curvature", "output", "1/m", False, use=ROLLS),
+    Point("port[k].tangent_rate_mean", "output", "1/s", False, use=ROLLS),
     _scalar("tension_left", "output", "N"),
     _scalar("tension_mid", "output", "N"),
     _scalar("tension_right", "output", "N"),
@@ -111,7 +114,8 @@ CONTACT = (
     Point("wheel.angular_velocity", "input", "rad/s"),
     Point("cable.position_mean", "input", "m", False, use=ENERGY_CONJUGATE),
     Point("cable.tangent_mean", "input", "1", False, use=ENERGY_CONJUGATE),
-    Point("cable.curvature", "input", "1/m", False, use="for a wheel that rolls along the cable"),
+    Point("cable.curvature", "input", "1/m", False, use=ROLLS),
+    Point("cable.tangent_rate_mean", "input", "1/s", False, use=ROLLS),
     Point("wheel.position_mean", "input", "m", False, use=ENERGY_CONJUGATE),
     Point("wheel.axle_mean", "input", "1", False, use=ENERGY_CONJUGATE),
     Point("wheel.rotation", "input", "rad", False, use=ENERGY_CONJUGATE),
@@ -119,6 +123,7 @@ CONTACT = (
     Point("cable.force", "output", "N"),
     Point("cable.moment", "output", "N.m"),
     _scalar("cable.s", "output", "m"),
+    _scalar("cable.s_rate", "output", "m/s", False, ROLLS),
     Point("wheel.force", "output", "N"),
     Point("wheel.moment", "output", "N.m"),
     Point("cable.force_rate", "output", "N/s", False, use=ENERGY_CONJUGATE),

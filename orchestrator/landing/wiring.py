@@ -113,7 +113,7 @@ def _possible(exchange: Exchange, components: Mapping[str, Fmu]) -> Exchange:
 def _moves_along(components: Mapping[str, Fmu], contact: str) -> bool:
     """Return whether the cable can move a contact's port within a step, and shows what the contact needs for that."""
     port, ports = f"port[{contact.removeprefix('contact')}]", components["cable"].ports
-    return f"{port}.s_rate" in ports and f"{port}.curvature.x" in ports
+    return all(f"{port}.{name}" in ports for name in ("s_rate", "curvature.x", "tangent_rate_mean.x"))
 
 
 def _connections(components: Mapping[str, Fmu]) -> list[Connection]:

@@ -29,6 +29,9 @@ class Observer(Protocol):
     def __call__(self, t: float, h: float) -> None:
         """All components went from `t` to `t + h`; the inputs of that step are still in `Graph.u`."""
 
+    def departs(self) -> None:
+        """A step begins: the discrete connections have been moved."""
+
     def save(self) -> Any:
         """Return what `restore` needs."""
 
@@ -150,6 +153,13 @@ class Graph(Arrays):
         """
         if self.exchange_discrete():
             self.refresh()
+
+    def exchange_discrete(self) -> bool:
+        """Move the discrete connections (at a communication point); return whether a number among them has changed."""
+        changed = super().exchange_discrete()
+        for observer in self.observers:
+            observer.departs()
+        return changed
 
     # -- the start ------------------------------------------------------------------------------------------
 

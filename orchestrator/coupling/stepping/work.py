@@ -4,6 +4,8 @@ Where a component has a load as input, ``X.force``, and its motion as output, ``
 a step is F + Ḟ (tau - t - H/2), so that its work is F·Δx + Ḟ·(H/2 (x0 + x1) - H x̄), with x̄ the time mean
 ``X.position_mean``; without it the second term is left out. A rotation is counted from the start of the step: x0 = 0. Where a
 component with a moment shows a tangent in the place of a rotation, as a cable does, it is the rotation of that tangent.
+Where the place of a load moves along a line within the step (``X.s_rate``), what the motion changes by for that reason is no
+motion of the material, and no work is done on it.
 
 The component that gives the load books the same work with what it knows: the load it has computed in the step and the
 motion it was told. The difference is the energy that the coupling makes; divided by the step it is the power residual
@@ -18,15 +20,17 @@ from typing import Any
 
 import numpy as np
 
-from orchestrator.coupling.exchange import LOADS, MEAN, RATE, motion_of, split, suffixed, tangent_of
+from orchestrator.coupling.exchange import LOADS, MEAN, RATE, along, motion_of, split, suffixed, tangent_of
 from orchestrator.coupling.fmu.group import Group
 from orchestrator.coupling.graph.graph import Graph, Node
 from orchestrator.coupling.kernel import kernel
 
 TINY = np.finfo(float).tiny
 AXES = 3  # components of a load; one with fewer has places -1 for the rest
-BEFORE, TOLD, GIVEN = slice(2, 5), slice(5, 8), slice(8, 11)
-"""Rows of the books after totals and residuals, what a step starts from: the motion, as the giver was told it, its load."""
+BEFORE, TOLD, GIVEN, LAY = slice(2, 5), slice(5, 8), slice(8, 11), slice(11, 14)
+"""Rows of the books after totals and residuals, what a step starts from: the motion, as the giver was told it, its load, and
+how the line lies at its place."""
+ROWS = 14
 ALL = slice(None)
 
 
@@ -43,6 +47,9 @@ class _Interface:
     told, told_mean : places in Graph.u where that one is told motion and mean
     given_rates : places in Graph.u of the slopes that it gives; none: its load is that of an instant, linear between
     from_start, turned : whether the motion is counted from the start of the step; whether it is a tangent that turns
+    lay, lay_mean : variables that say by what the motion changes along a line, and their means; none where it has none
+    speed : input at which rate the place moves along the line; empty where it has none
+    placed : whether the place is told anew at communication points
     """
 
     name: str
@@ -57,6 +64,10 @@ class _Interface:
     given_rates: list[int]
     from_start: bool
     turned: bool
+    lay: list[str]
+    lay_mean: list[str]
+    speed: str
+    placed: bool
 
 
 class Work:
@@ -77,7 +88,7 @@ class Work:
         self.names = [interface.name for interface in self.interfaces]
         self.givers = list(dict.fromkeys(i.giver for i in self.interfaces if i.giver))
         self._place(found)
-        self._books, self._x = np.zeros((2 + 3 * AXES, len(self.names))), np.zeros((3, AXES))
+        self._books, self._x = np.zeros((ROWS, len(self.names))), np.zeros((3, AXES))
         self.total, self.residual = self._books[0], self._books[1]
         self._tried: np.ndarray | None = None
 
@@ -85,7 +96,8 @@ class Work:
         """Find the places of all that is read: of loads and slopes among the links, of motions among what is shown."""
         shown: dict[str, dict[str, None]] = {}
         for node, one in found:
-            shown.setdefault(node.name, {}).update(dict.fromkeys([*one.motion, *one.mean]))
+            wanted = [*one.motion, *one.mean, *one.lay, *one.lay_mean, *([one.speed] if one.speed else [])]
+            shown.setdefault(node.name, {}).update(dict.fromkeys(wanted))
         place = {signal: i for i, signal in enumerate((c, name) for c, names in shown.items() for name in names)}
         self._shown, first = np.zeros(len(place)), 0
         self._groups: list[Group] = []
@@ -105,6 +117,10 @@ class Work:
         self._told_mean = _rows([one.told_mean for one in interfaces])
         self._motion = _rows([motions(one.motion, node) for node, one in found])
         self._mean = _rows([motions(one.mean, node) for node, one in found])
+        self._lay = _rows([motions(one.lay, node) for node, one in found])
+        self._lay_mean = _rows([motions(one.lay_mean, node) for node, one in found])
+        self._speed = _rows([motions([one.speed] if one.speed else [], node) for node, one in found])[:, 0]
+        self._placed = np.array([one.placed for one in interfaces], dtype=bool)
         kinds = [(one.own, one.from_start, one.turned, bool(one.giver)) for one in interfaces]
         self._kinds = np.array(kinds, dtype=np.bool_).reshape(-1, 4)
         self._from_start, self._known = self._kinds[:, 1], self._kinds[:, 3]
@@ -120,6 +136,14 @@ class Work:
         books[BEFORE] = still * _taken(self._shown, self._motion)
         books[TOLD] = still * _taken(self.graph.u, self._told)
         books[GIVEN] = self._known * _taken(self.graph.gathered(ALL), self._loads)
+        books[LAY] = _taken(self._shown, self._lay)
+
+    def departs(self) -> None:
+        """Take the motions of places that have been told anew: a step begins from there."""
+        if self._placed.any():
+            self._read()
+            for row, places in ((BEFORE, self._motion), (TOLD, self._motion), (LAY, self._lay)):
+                self._books[row][:, self._placed] = _taken(self._shown, places)[:, self._placed]
 
     def _read(self) -> None:
         for group in self._groups:
@@ -160,12 +184,16 @@ class Work:
         self._read()
         book(
             h, graph.acted, graph.r, graph.gathered(ALL), self._shown, self._loads, self._rates, self._motion,
-            self._mean, self._told, self._told_mean, self._given_rates, self._kinds, self._x, books,
+            self._mean, self._told, self._told_mean, self._given_rates, self._lay, self._lay_mean, self._speed, self._kinds,
+            self._x, books,
         )  # fmt: skip
 
 
 @kernel
-def book(h, acted, slopes, given, shown, loads, rates, motion, mean, told, told_mean, given_rates, kinds, x, books):
+def book(
+    h, acted, slopes, given, shown, loads, rates, motion, mean, told, told_mean, given_rates, lay, lay_mean, speed, kinds, x,
+    books,
+):  # fmt: skip
     """Add the work of a step of length `h` to the `books`: of each interface as its receiver and as its giver have it.
 
     Parameters
@@ -173,9 +201,10 @@ def book(h, acted, slopes, given, shown, loads, rates, motion, mean, told, told_
     acted, given : (n_u,) inputs that acted in the step, and what their givers say
     slopes, shown : (n_r,), (n_shown,) slopes set by the master, and motions and means that components show
     loads, rates, motion, mean, told, told_mean, given_rates : (n, 3) places of what `_Interface` names, -1: there is none
+    lay, lay_mean, speed : (n, 3), (n, 3), (n,) such places, too
     kinds : (n, 4) own, from_start, turned, whether there is a giver
     x : (3, 3) workspace: the motion at the start, at the end, its mean
-    books : (11, n) changed
+    books : (14, n) changed
     """
     for i in range(loads.shape[0]):
         from_start, turned, known = kinds[i, 1], kinds[i, 2], kinds[i, 3]
@@ -203,6 +232,8 @@ def book(h, acted, slopes, given, shown, loads, rates, motion, mean, told, told_
                     factor = angle / sine if sine > 0.0 else 1.0
                     x[j, 0], x[j, 1], x[j, 2] = a0 * factor, a1 * factor, a2 * factor
                 x[0, 0], x[0, 1], x[0, 2] = 0.0, 0.0, 0.0
+            if speed[i] >= 0 and shown[speed[i]] != 0.0:
+                _take_off(i, shown[speed[i]], h, turned, books, shown, motion, lay, lay_mean, x)
             work = 0.0
             for k in range(3):
                 if loads[i, k] < 0:
@@ -227,6 +258,35 @@ def book(h, acted, slopes, given, shown, loads, rates, motion, mean, told, told_
                 books[0, i] += work
             else:
                 books[1, i] += done - work
+        for k in range(3):
+            books[11 + k, i] = shown[lay[i, k]] if lay[i, k] >= 0 else 0.0
+
+
+@kernel
+def _take_off(i, speed, h, turned, books, shown, motion, lay, lay_mean, x):
+    """Take off the motion `x` of interface i (start, end, mean) what it is for its place having moved along at `speed`.
+
+    That is the integral of speed times lay, the lay of the line being linear about its mean in the step; of a tangent t that
+    turns, c its lay, that of t × c / |t|².
+    """
+    if turned:
+        t0, t1, t2 = shown[motion[i, 0]], shown[motion[i, 1]], shown[motion[i, 2]]
+        c0 = 0.5 * (books[11, i] + shown[lay[i, 0]])
+        c1 = 0.5 * (books[12, i] + shown[lay[i, 1]])
+        c2 = 0.5 * (books[13, i] + shown[lay[i, 2]])
+        factor = speed * h / (t0 * t0 + t1 * t1 + t2 * t2)
+        turn = (factor * (t1 * c2 - t2 * c1), factor * (t2 * c0 - t0 * c2), factor * (t0 * c1 - t1 * c0))
+        for k in range(3):
+            x[1, k] -= turn[k]
+            x[2, k] -= 0.5 * turn[k]
+        return
+    for k in range(3):
+        if lay[i, k] < 0:
+            continue
+        first, last = books[11 + k, i], shown[lay[i, k]]
+        middle = shown[lay_mean[i, k]] if lay_mean[i, k] >= 0 else 0.5 * (first + last)
+        x[1, k] -= speed * h * middle
+        x[2, k] -= speed * h * (0.5 * middle - (last - first) / 12.0)
 
 
 def _rows(places: list[list[int]]) -> np.ndarray:
@@ -285,20 +345,27 @@ def _interface(graph: Graph, node: Node, stem: str, names: _Names, from_start: b
     free = {name: i for i, (part, name) in enumerate(graph.free_rates) if part == node.name}
     own = all(name in free for name in names.rates)
     loads, giver = [fed[name] for name in names.loads], _giver_of(graph, node, names)
-    told = _told(graph, node, names.motions, giver)
+    told, ports = _told(graph, node, names.motions, giver), node.fmu.ports
+    lay, speed = [along(name)[0] for name in names.motions], along(names.motions[0])[1]
+    moves = all(name in ports for name in [*lay, speed])
+    lay_mean = [suffixed(name, MEAN) for name in lay]
     return _Interface(
         name=f"{node.name}.{stem}",
         loads=loads,
         rates=_places(names.rates, free if own else fed),
         own=own,
         motion=names.motions,
-        mean=names.means if all(name in node.fmu.ports for name in names.means) else [],
+        mean=names.means if all(name in ports for name in names.means) else [],
         giver=giver if told else "",
         told=told,
         told_mean=_told(graph, node, names.means, giver),
         given_rates=_places(names.rates, fed),
         from_start=from_start,
         turned=turned,
+        lay=lay if moves else [],
+        lay_mean=lay_mean if moves and all(name in ports for name in lay_mean) else [],
+        speed=speed if moves else "",
+        placed=not from_start and bool(node.discrete_inputs.names),
     )
 
 

@@ -22,6 +22,8 @@ FORCE, MOMENT = 10.0, 1.0
 STEPS = 20
 """Macro steps at rest."""
 REST = "equilibrium"
+SPEED = 1.0
+"""m/s along the line, of a port that moves."""
 
 
 def bench_of(path: Path, macro_step: float | None = None, isolate: Isolation = False) -> Bench:
@@ -44,6 +46,7 @@ def cable_rows(bench: Bench) -> Iterator[Row]:
     n = _ports(bench)
     yield _tangents(bench, n)
     yield _rest(bench)
+    yield _moving(bench)
     yield from _answers(bench, min(n, 2))
     two = pair(bench, cable_course(bench, 2))
     ports = [f"port[{k + 1}]" for k in range(n)]
@@ -92,6 +95,20 @@ def _tangents(bench: Bench, n: int) -> Row:
         compared.good,
         "normalised, or another arc length",
     )
+
+
+def _moving(bench: Bench) -> Row:
+    """Return whether a port that moves along is afterwards where a port is that has been there from the start."""
+    name = "port[1] moves along"
+    if not bench.has("port[1].s_rate"):
+        return untestable(name, "it has no port[1].s_rate: a load that rolls stands still within a step")
+    s, way = float(bench.parameters["port[1].s"]), SPEED * bench.H
+    motion = bench.run({"port[1].s_rate": SPEED}, bench.H, 1)
+    start, end = motion["port[1].position"]
+    there = _shown(bench, s + way, "position")
+    compared = deviation(end - start, there - start, at=float(np.max(np.abs(start))))
+    why = "it stands still, or s counts from elsewhere"
+    return judged(name, "at s + s_rate H after a step", "positions at other s", compared.words(), compared.good, why)
 
 
 def _rest(bench: Bench) -> Row:
