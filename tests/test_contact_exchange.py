@@ -55,10 +55,10 @@ def triples(rows, first):
 
 
 def random_inputs(rng, size=1e-3):
-    """A start motion and inputs (45,) that differ from it by about `size`."""
+    """A start motion and inputs (48,) that differ from it by about `size`."""
     start = np.zeros(24)
     start[at.TANGENT + 1], start[at.CENTRE + 2], start[at.AXLE] = 1.0, SEAT - 3e-3, 1.0
-    inputs = np.zeros(45)
+    inputs = np.zeros(at.INPUT_SIZE)
     inputs[: at.MEANS] = start
     inputs[: at.MEANS] += size * rng.normal(size=24)
     for j, i in enumerate((0, 1, 2, 3, 4, 5, 12, 13, 14, 15, 16, 17)):

@@ -13,10 +13,12 @@ from orchestrator.landing.monolithic.solve import solve
 from orchestrator.landing.wiring import landing_graph
 from orchestrator.runs.coupled import run_coupled
 from orchestrator.runs.systems import resolve
+from verification.cable import time_steps
+from verification.cable.setups import cable as soft_cable
+from verification.cable.time_steps import SOFT
 
 LINE = {"span": 20.0, "unstretched_length": 20.1, "n_elements": 10, "integration_step": 2.5e-4}
 H = 0.01
-ENERGIES = ("kinetic_energy", "strain_energy", "gravitational_energy", "dissipated_energy")
 
 
 def made(module, values):
@@ -76,23 +78,22 @@ def test_a_moving_load_is_many_that_stand():
     assert estimate < 1e-2 * np.max(np.abs(fine - cable().nodes_at(cable().state)))
 
 
-@pytest.mark.parametrize("integrator", ["collocation", "generalized_alpha"])
-def test_the_work_through_a_moving_port_is_the_energy_of_the_cable(integrator: str):
-    """Expected: first law. What is left is the integration's error, of order 3 and 2."""
+def missing(integrator: str, step: float, s: float) -> float:
+    """Return what is missing in the energy balance of a soft cable whose port moves by 0.5 m from `s`, of the work done."""
+    one = soft_cable(SOFT, integrator=integrator, spectral_radius=1.0, integration_step=step)
+    before = time_steps.energies(one).sum()
+    put(one, s=s, s_rate=1.0, **{"force.z": 20.0, "force.y": 5.0, "force_rate.z": 100.0, "moment.x": 3.0})
+    for k in range(5):
+        one.step(0.1 * k, 0.1)
+    return abs(time_steps.energies(one).sum() - before - one["port[1].work"]) / one["port[1].work"]
 
-    def missing(step: float) -> tuple[float, float]:
-        one = cable(integration_step=step, integrator=integrator, spectral_radius=1.0, **{"port[1].s": 6.5})
-        indices = one.table.indices(ENERGIES)
-        before, work = one.values[indices].sum(), one.table.index["port[1].work"]
-        rates = {"force_rate.y": 400.0, "moment_rate.x": -50.0}
-        put(one, **{"s_rate": 3.0, "force.z": -200.0, "force.y": 50.0, "moment.x": 5.0}, **rates)
-        for i in range(4):
-            one.step(i * H, H)
-        return float(abs(one.values[indices].sum() - before - one.values[work])), float(one.values[work])
 
-    (coarse, work), (fine, _) = missing(1e-3), missing(2.5e-4)
-    assert coarse < 1e-3 * abs(work)
-    assert fine < coarse / (30.0 if integrator == "collocation" else 8.0)
+def test_the_work_through_a_moving_port_is_the_energy_of_the_cable():
+    """Expected: first law, but for the error of the method: order 4 (round-off here) and 2. From 3.3 m on the port passes the
+    node at 3.5 m, where the curvature jumps: the mean of the tangent is then one of order 2."""
+    assert missing("collocation", 1e-3, 3.6) < 1e-9
+    assert missing("collocation", 1e-3, 3.3) < 0.3 * missing("collocation", 2e-3, 3.3) < 1e-6
+    assert missing("generalized_alpha", 1e-3, 3.6) < 0.3 * missing("generalized_alpha", 2e-3, 3.6) < 1e-3
 
 
 def test_a_port_that_would_leave_the_cable_is_refused():
@@ -171,7 +172,7 @@ def test_order_while_a_wheel_is_driven_along_the_rig():
 def test_the_books_know_that_the_place_moves():
     """Expected: the work that the cable itself has booked through its port, by stages of its own integration."""
     run = run_coupled(driven(0.005))
-    work, books = run.table["cable.port[1].work"], run.log.work
+    work, books = run.table["cable.port[1].work"], run.log.energy
     total = books["cable.port[1].force"] + books["cable.port[1].moment"]
     assert np.max(np.abs(total - work)) < 1e-5 * np.max(np.abs(work))
 
