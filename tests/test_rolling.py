@@ -9,6 +9,7 @@ from fmus.cable.module import Cable
 from fmus.contact import places as at
 from fmus.contact.module import Contact
 from orchestrator.api import load_scenario
+from orchestrator.coupling.errors import InputError
 from orchestrator.landing.monolithic.solve import solve
 from orchestrator.landing.wiring import landing_graph
 from orchestrator.runs.coupled import run_coupled
@@ -177,8 +178,14 @@ def test_the_books_know_that_the_place_moves():
     assert np.max(np.abs(total - work)) < 1e-5 * np.max(np.abs(work))
 
 
-def test_a_cable_that_cannot_move_its_port_is_told_so():
+def test_the_port_moves_where_the_exchange_and_the_scenario_let_it():
     landing = resolve(driven(0.005)).landing
     for exchange, moves in (("waveform", True), ("hermite", True), ("point", False)):
         with landing_graph(landing, exchange) as graph:
             assert graph.components["contact1"].parameters["moving_port"] is moves
+    held = resolve(driven(0.005, **{"contact.parameters.moving_port": False})).landing
+    with landing_graph(held, "waveform") as graph:
+        assert graph.components["contact1"].parameters["moving_port"] is False
+    asked = resolve(driven(0.005, **{"contact.parameters.moving_port": True})).landing
+    with pytest.raises(InputError, match=r"contact\.parameters\.moving_port = true: exchange = point has no motion"):
+        landing_graph(asked, "point")

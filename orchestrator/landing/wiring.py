@@ -7,6 +7,7 @@ from collections.abc import Iterator, Mapping
 from pathlib import Path
 
 from orchestrator.catalogue import library
+from orchestrator.coupling.errors import InputError
 from orchestrator.coupling.exchange import (
     EXCHANGES,
     MOVING,
@@ -22,6 +23,8 @@ from orchestrator.coupling.graph.supply import Missing, Supply
 from orchestrator.landing.resolve import Landing
 from orchestrator.scenario.isolation import isolation
 
+MOVED = ("s_rate", "curvature.x", "tangent_rate_mean.x")
+"""What a port of the cable has that moves along within a step."""
 CONTROLLER = "controller"
 """Component that flies the robot."""
 LONGEST_ADAPTIVE = 2.5e-3
@@ -60,7 +63,7 @@ def landing_graph(landing: Landing, exchange: str) -> Graph:
         for name, fmu in _contacts(components).items():
             fmu.set_parameters({PARAMETER: possible.name})
             if MOVING in fmu.ports:
-                fmu.set_parameters({MOVING: possible.slopes and _moves_along(components, name)})
+                fmu.set_parameters({MOVING: _moves(landing, possible, components, name)})
         inputs = {f"robot.{name}": course for name, course in landing.robot.courses.items()}
         return Graph(components, _kept(_connections(components), possible), order=tuple(components), inputs=inputs)
     except BaseException:
@@ -110,10 +113,22 @@ def _possible(exchange: Exchange, components: Mapping[str, Fmu]) -> Exchange:
     return exchange
 
 
-def _moves_along(components: Mapping[str, Fmu], contact: str) -> bool:
-    """Return whether the cable can move a contact's port within a step, and shows what the contact needs for that."""
+def _moves(landing: Landing, exchange: Exchange, components: Mapping[str, Fmu], contact: str) -> bool:
+    """Return whether a contact's port moves within a step: where the cable can do that, unless the scenario holds it.
+
+    Raises
+    ------
+    InputError : the scenario asks for what cannot be
+    """
     port, ports = f"port[{contact.removeprefix('contact')}]", components["cable"].ports
-    return all(f"{port}.{name}" in ports for name in ("s_rate", "curvature.x", "tangent_rate_mean.x"))
+    lacking = [f"{port}.{name}" for name in MOVED if f"{port}.{name}" not in ports]
+    asked = landing.contact.settings.get(MOVING)
+    if asked and (lacking or not exchange.slopes):
+        why = (
+            f"the cable has no {lacking[0]}" if lacking else f"exchange = {exchange.name} has no motion within the step"
+        )
+        raise InputError(f"contact.parameters.{MOVING} = true: {why}; leave it out")
+    return bool(asked is not False and not lacking and exchange.slopes)
 
 
 def _connections(components: Mapping[str, Fmu]) -> list[Connection]:

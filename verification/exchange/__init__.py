@@ -2,6 +2,6 @@
 
 from types import ModuleType
 
-from verification.exchange import drop, moments, smooth
+from verification.exchange import drop, moments, rolling, smooth
 
-STUDIES: tuple[ModuleType, ...] = (moments, smooth, drop)
+STUDIES: tuple[ModuleType, ...] = (moments, smooth, rolling, drop)
