@@ -15,6 +15,8 @@ import pytest
 from orchestrator.coupling.graph.graph import Graph
 from orchestrator.coupling.graph.links import Connection
 from orchestrator.coupling.run.log import Log
+from orchestrator.coupling.stepping.free_response import FreeResponse
+from orchestrator.coupling.stepping.record import Record
 from tests.fmus import fmu
 from tests.systems import run
 
@@ -34,8 +36,8 @@ def pair(
     parts = {
         name: fmu("link", name, mass=1.0 + i, initial_velocity=speeds[i], steps=steps) for i, name in enumerate(names)
     }
-    gap = {"gap": -0.01 * number} if kind == "spring" else {}
-    parts[f"s{number}"] = fmu(kind, f"s{number}", **law, **gap)
+    gap = {"gap": law.get("gap", -0.01 * number)} if kind == "spring" else {}
+    parts[f"s{number}"] = fmu(kind, f"s{number}", **law | gap)
     pairs = []
     for side, name in zip("ab", names, strict=True):
         pairs += [(f"{name}.{v}", f"s{number}.{side}.{v}") for v in variables]
@@ -77,6 +79,24 @@ def test_halved_and_adaptive_steps_too():
     steps = 1 + log.steps.column("subdivisions")
     assert np.max(steps) > 2
     assert log.solves["a0"] <= 1.75 * np.sum(steps[1:]) + 20  # 1.5: two steps, and one of both for the error
+
+
+def test_pulses_are_made_once_for_each_length_of_step(monkeypatch: pytest.MonkeyPatch):
+    """Expected: steps that adapt go from one length to another and back, and what has been measured stays."""
+    made: list[tuple[str, float]] = []
+    measure = FreeResponse.measure
+
+    def noted(free: FreeResponse, t: float, step: float, *rest: object) -> np.ndarray:
+        made.append((free.node.name, step))
+        return measure(free, t, step, *rest)
+
+    monkeypatch.setattr(FreeResponse, "measure", noted)
+    monkeypatch.setattr(Record, "pays", lambda *_: True)
+    apart = [pair(i, WAVES, "spring", BUFFER | {"gap": gap}) for i, gap in enumerate((0.04, 0.16))]
+    log = collided("model", *apart, local_tolerance=1e-7, memory=0.004)
+    assert np.sum(np.diff(log.steps.column("subdivisions")) != 0) >= 4
+    assert len({step for _, step in made}) >= 2
+    assert len(made) == len(set(made))
 
 
 def test_without_means():

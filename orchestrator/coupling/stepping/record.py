@@ -6,6 +6,7 @@ Hard impacts and long steps are the polynomial's; wherever a free response is sm
 from __future__ import annotations
 
 from dataclasses import dataclass
+from math import log10
 
 import numpy as np
 
@@ -52,7 +53,7 @@ class Record:
         self.iterations = FORGET * self.iterations + (1.0 - FORGET) * iterations
         if residual <= LEAST:  # in the air there is nothing to foretell: good for both, and soon no longer true
             return
-        digits = float(np.log10(np.clip(residual, LEAST, LARGEST)))
+        digits = log10(min(max(residual, LEAST), LARGEST))
         if not by_model:
             self.polynomial, self.left = _faded(self.polynomial, digits, self.steps - self.left), self.steps
             return
