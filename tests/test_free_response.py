@@ -11,7 +11,7 @@ from orchestrator.api import load_scenario
 from orchestrator.coupling.exchange import rate_of
 from orchestrator.coupling.masters.interface_jacobian import InterfaceJacobian
 from orchestrator.coupling.stepping import free_response
-from orchestrator.coupling.stepping.free_response import FreeResponse, Past
+from orchestrator.coupling.stepping.free_response import FreeResponse
 from orchestrator.coupling.stepping.record import PROBE, Record
 from orchestrator.runs.coupled import run_coupled
 
@@ -80,7 +80,7 @@ def _run(free: FreeResponse, node: _Node, h: float, steps: int) -> np.ndarray:
             foretold = free.foretold(h, jacobian) + jacobian[:, 0] * rough[i]
         node.loads.append(rough[i])
         node.show((i + 1) * h, h)
-        free.append(h, Past(free.start, node.outputs.values.copy(), rough[i : i + 1]))
+        free.append(h, free.seen(h, free.start, node.outputs.values.copy(), rough[i : i + 1]))
     return foretold - node.outputs.values
 
 
@@ -110,9 +110,9 @@ def test_two_halves_joined_are_the_whole_step():
     for i in range(2):
         free.begin()
         node.show(0.3 + (i + 1) * H, H)
-        pasts.append(Past(free.start, node.outputs.values.copy(), np.zeros(1)))
+        pasts.append(free.seen(H, free.start, node.outputs.values.copy(), np.zeros(1)))
     whole.show(0.3 + 2 * H, 2 * H)
-    assert np.allclose(free.joined(*pasts, np.zeros(1)).end, whole.outputs.values, atol=1e-14)
+    assert np.allclose(free.joined(2 * H, *pasts, np.zeros(1)).end, whole.outputs.values, atol=1e-14)
 
 
 @pytest.mark.parametrize("k", range(1, free_response.ORDER + 2))
@@ -155,6 +155,17 @@ def test_steps_in_the_air_say_nothing_of_either():
         record.note(by_model=by_model, residual=0.0, iterations=1)
     assert np.isnan(record.model) and np.isnan(record.polynomial)
     assert record.asks_models
+
+
+def test_a_record_is_worth_the_less_the_older_it_is():
+    """Expected: models that were bad 32 steps ago, and are good now, win at once; the past weighs 0.8 a step."""
+    record = Record()
+    record.note(by_model=True, residual=1.0, iterations=3)
+    for _ in range(31):
+        record.note(by_model=False, residual=1e-3, iterations=2)
+    record.note(by_model=True, residual=1e-6, iterations=1)
+    assert record.model == pytest.approx(-6.0 * (1.0 - 0.8**32))
+    assert record.models_win
 
 
 def test_pulses_are_made_where_they_pay():

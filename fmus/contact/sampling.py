@@ -13,7 +13,6 @@ from fmus.contact.law import LEFT, OK, axle, foot, friction, lateral, walls
 from fmus.contact.path import motion_at
 from fmus.kernels.jit import kernel
 
-
 FOOT_ITERATIONS = 6
 FOOT_ERROR = 1e-13
 """m; each iteration shrinks the error by curvature times the wheel's distance, 1e-2 or less for a wheel on the cable."""

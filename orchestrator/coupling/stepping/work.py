@@ -79,6 +79,8 @@ class Work:
     total : (len(names),) J, since `start`
     residual : (len(names),) J, since `start`: `total` less what the giver of the load has booked; nan where that one is
         not told the motion
+    booked : (len(names),) whether both sides are
+    givers : the components that give such loads
     """
 
     def __init__(self, graph: Graph):
@@ -123,7 +125,7 @@ class Work:
         self._placed = np.array([one.placed for one in interfaces], dtype=bool)
         kinds = [(one.own, one.from_start, one.turned, bool(one.giver)) for one in interfaces]
         self._kinds = np.array(kinds, dtype=np.bool_).reshape(-1, 4)
-        self._from_start, self._known = self._kinds[:, 1], self._kinds[:, 3]
+        self._from_start, self.booked = self._kinds[:, 1], self._kinds[:, 3]
 
     def start(self) -> None:
         """Begin at the present positions."""
@@ -131,10 +133,11 @@ class Work:
         self._read()
         books = self._books
         books[:] = 0.0
-        self.residual[~self._known] = np.nan
+        self.residual[~self.booked] = np.nan
         still = ~self._from_start
         books[BEFORE] = still * _taken(self._shown, self._motion)
         books[TOLD] = still * _taken(self.graph.u, self._told)
+<<<<<<< HEAD
         books[GIVEN] = self._known * _taken(self.graph.gathered(ALL), self._loads)
         books[LAY] = _taken(self._shown, self._lay)
 
@@ -144,6 +147,9 @@ class Work:
             self._read()
             for row, places in ((BEFORE, self._motion), (TOLD, self._motion), (LAY, self._lay)):
                 self._books[row][:, self._placed] = _taken(self._shown, places)[:, self._placed]
+=======
+        books[GIVEN] = self.booked * _taken(self.graph.gathered(ALL), self._loads)
+>>>>>>> h/model
 
     def _read(self) -> None:
         for group in self._groups:
@@ -166,7 +172,7 @@ class Work:
         tried = self.save()
         self._book(H, tried)
         self._tried = tried
-        return float(np.sum(tried[1], where=self._known))
+        return float(np.sum(tried[1], where=self.booked))
 
     def forget(self) -> None:
         """The step that was `tried` is not accepted as it is."""
