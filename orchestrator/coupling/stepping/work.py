@@ -137,8 +137,7 @@ class Work:
         still = ~self._from_start
         books[BEFORE] = still * _taken(self._shown, self._motion)
         books[TOLD] = still * _taken(self.graph.u, self._told)
-<<<<<<< HEAD
-        books[GIVEN] = self._known * _taken(self.graph.gathered(ALL), self._loads)
+        books[GIVEN] = self.booked * _taken(self.graph.gathered(ALL), self._loads)
         books[LAY] = _taken(self._shown, self._lay)
 
     def departs(self) -> None:
@@ -147,9 +146,6 @@ class Work:
             self._read()
             for row, places in ((BEFORE, self._motion), (TOLD, self._motion), (LAY, self._lay)):
                 self._books[row][:, self._placed] = _taken(self._shown, places)[:, self._placed]
-=======
-        books[GIVEN] = self.booked * _taken(self.graph.gathered(ALL), self._loads)
->>>>>>> h/model
 
     def _read(self) -> None:
         for group in self._groups:
