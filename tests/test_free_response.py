@@ -3,6 +3,7 @@
 from __future__ import annotations
 
 from types import SimpleNamespace
+from typing import Any
 
 import numpy as np
 import pytest
@@ -218,7 +219,7 @@ def test_hard_drops_cost_no_more_solves_than_before_there_were_models(stiffness:
 
 def test_an_iteration_that_ends_soon_gets_no_new_jacobian():
     """Expected: three more iterations by a factor of 1e-2 each take 1e-3 below 3e-6; by 0.5 each they do not."""
-    master = SimpleNamespace(max_iterations=10, outer=7, tolerance=3e-6)
+    master: Any = SimpleNamespace(max_iterations=10, outer=7, tolerance=3e-6)
     assert InterfaceJacobian._ends_soon(master, 1e-3, 1e-2)
     assert not InterfaceJacobian._ends_soon(master, 1e-3, 0.5)
     assert not InterfaceJacobian._ends_soon(master, 1e-3, 1e200)

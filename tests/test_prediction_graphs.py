@@ -8,6 +8,7 @@ the masses is, and every step after the first ones is one solve.
 from __future__ import annotations
 
 from collections.abc import Iterable
+from typing import Any
 
 import numpy as np
 import pytest
@@ -86,7 +87,7 @@ def test_pulses_are_made_once_for_each_length_of_step(monkeypatch: pytest.Monkey
     made: list[tuple[str, float]] = []
     measure = FreeResponse.measure
 
-    def noted(free: FreeResponse, t: float, step: float, *rest: object) -> np.ndarray:
+    def noted(free: FreeResponse, t: float, step: float, *rest: Any) -> np.ndarray:
         made.append((free.node.name, step))
         return measure(free, t, step, *rest)
 

@@ -51,7 +51,7 @@ class Transfer:
             np.multiply(inputs, self.scaling[0], out=inputs)
             np.add(inputs, self.scaling[1], out=inputs)
 
-    def moved(self, outputs: np.ndarray, places: np.ndarray) -> np.ndarray:
+    def moved(self, outputs: np.ndarray, places: slice | np.ndarray) -> np.ndarray:
         """Return what the `outputs` say about the inputs at `places`, (len(places),)."""
         values = outputs[self.source[places]]
         return values if self.scaling is None else values * self.scaling[0][places] + self.scaling[1][places]
@@ -197,7 +197,7 @@ class Arrays:
         """Move all continuous outputs to the inputs: u from y."""
         self._continuous.move(self.y, self.u)
 
-    def gathered(self, places: np.ndarray) -> np.ndarray:
+    def gathered(self, places: slice | np.ndarray) -> np.ndarray:
         """Return what the outputs say about the inputs at `places` of u: (len(places),)."""
         return self._continuous.moved(self.y, places)
 
