@@ -1,7 +1,8 @@
 """Measure what the methods note shows, draw its pictures and fill its tables.
 
-python docs/methods.py            measures (some minutes); writes docs/methods.json, the pictures, the tables
-python docs/methods.py --fill     pictures and tables from the file alone
+python docs/methods.py                 measures (some minutes); writes docs/methods.json, the pictures, the tables
+python docs/methods.py limits energy   measures these parts alone
+python docs/methods.py --fill          pictures and tables from the file alone
 """
 
 from __future__ import annotations
@@ -9,6 +10,7 @@ from __future__ import annotations
 import json
 import re
 import sys
+from collections.abc import Callable
 from pathlib import Path
 from typing import Any
 
@@ -34,21 +36,23 @@ Found = dict[str, Any]
 # -- measuring ----------------------------------------------------------------------------------------------------
 
 
-def measured() -> Found:
-    """Return all numbers of the note."""
-    from orchestrator import __version__
+def memories() -> list[Found]:
+    """Return the solves by the steps that a load is remembered."""
+    return [solves(FLAGSHIP, 10.0, STEP, {"master.memory": lags * STEP}) for lags in range(LONGEST + 1)]
 
-    return {
-        "version": __version__,
-        "free": free_response(FLAGSHIP, 4.0),
-        "memory": [solves(FLAGSHIP, 10.0, STEP, {"master.memory": lags * STEP}) for lags in range(LONGEST + 1)],
-        "limits": [
-            {"case": name, "step": step, **{kind: limit(one, stop, k, step, kind) for kind in ("model", "polynomial")}}
-            for name, one, stop, k, steps in LIMITS
-            for step in steps
-        ],
-        "energy": [energy(tolerance, budget) for tolerance in TOLERANCES for budget in BUDGETS],
-    }
+
+def limits() -> list[Found]:
+    """Return the solves of each case and step with both predictions."""
+    return [
+        {"case": name, "step": step, **{kind: limit(one, stop, k, step, kind) for kind in ("model", "polynomial")}}
+        for name, one, stop, k, steps in LIMITS
+        for step in steps
+    ]
+
+
+def energies() -> list[Found]:
+    """Return what is made by tolerance and budget."""
+    return [energy(tolerance, budget) for tolerance in TOLERANCES for budget in BUDGETS]
 
 
 def limit(scenario: str, stop: float, stiffness: float | None, step: float, prediction: str) -> Found:
@@ -135,6 +139,22 @@ def explained(x: np.ndarray, responses: np.ndarray, lags: int, m: int) -> np.nda
 def rounded(values: np.ndarray) -> list[float]:
     """Return numbers to eight digits: the file is read by people too."""
     return [float(f"{value:.8g}") for value in values]
+
+
+PARTS: dict[str, Callable[[], Any]] = {
+    "free": lambda: free_response(FLAGSHIP, 4.0),
+    "memory": memories,
+    "limits": limits,
+    "energy": energies,
+}
+
+
+def measured(parts: list[str]) -> Found:
+    """Return all numbers of the note, those of `parts` measured anew, all where none is named."""
+    from orchestrator import __version__
+
+    before = json.loads(FILE.read_text(encoding="utf-8")) if parts else {}
+    return before | {"version": __version__} | {name: PARTS[name]() for name in parts or PARTS}
 
 
 # -- drawing ------------------------------------------------------------------------------------------------------
@@ -281,7 +301,7 @@ def filled(text: str, found: Found) -> str:
 def main() -> None:
     """Measure, unless only filling is asked for; draw, and fill the pages."""
     if "--fill" not in sys.argv:
-        FILE.write_text(json.dumps(measured()) + "\n", encoding="utf-8")
+        FILE.write_text(json.dumps(measured(sys.argv[1:])) + "\n", encoding="utf-8")
     found = json.loads(FILE.read_text(encoding="utf-8"))
     draw(found)
     for page in PAGES:
