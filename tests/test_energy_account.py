@@ -62,15 +62,36 @@ def test_every_implicit_master_keeps_it(master: str):
 @pytest.mark.slow
 @pytest.mark.parametrize("tolerance", [1e-8, 1e-6, 1e-5, 1e-4, 1e-3, 1e-2])
 @pytest.mark.parametrize("budget", ["dissipated", 0])
-def test_a_minute_on_an_undamped_line(tolerance: float, budget: str | float):
-    run = _run(UNDAMPED, 60.0, tolerance, budget)
+@pytest.mark.parametrize("height", [0.0, 0.05])
+def test_a_minute_on_an_undamped_line(height: float, tolerance: float, budget: str | float):
+    """From touch, and after an impact at 1 m/s."""
+    run = _run(UNDAMPED, 60.0, tolerance, budget, **{"landing.height": height})
     made, allowed = _made(run), run.table[f"contact1.{DISSIPATED}"] if budget else 0.0
     assert np.all(made <= allowed + ROUND_OFF * _exchanged(run))
     assert run.log.error is None
 
 
+@pytest.mark.parametrize("iterations", [1, 2])
+def test_steps_that_cannot_keep_it_are_divided_or_said_to_be_unconverged(iterations: int):
+    """Expected: no iteration is left to correct the energy, so that steps are halved, and where that does not help they do not
+    count as converged; never is more made in silence."""
+    options = {"master.prediction": "polynomial", "master.max_iterations": iterations, "master.max_depth": 3}
+    run = _run(UNDAMPED, 0.1, 1e-2, 0, **options)
+    steps = run.log.steps_table
+    over = np.diff(np.maximum.accumulate(_made(run))) > ROUND_OFF * _exchanged(run)
+    assert np.sum(steps["rejected"]) > 0
+    assert not np.any(over & (steps["converged"] == 1))
+
+
+def test_a_budget_in_joules_is_used_and_kept():
+    """Expected: with a tolerance of 1e-2 more than a microjoule would be made (above): it is used up, and no more."""
+    run = _run(UNDAMPED, 1.0, 1e-2, 1e-6, **{"master.prediction": "polynomial"})
+    assert 0.0 < np.max(_made(run)) <= 1e-6 + ROUND_OFF * _exchanged(run)
+
+
 def test_budgets_that_do_not_exist():
-    with pytest.raises(InputError, match="energy_budget 'much': choose dissipated, none or 0"):
-        _run(UNDAMPED, 0.01, 1e-6, "much")
-    with pytest.raises(InputError, match="energy_budget 3"):
-        _run(UNDAMPED, 0.01, 1e-6, 3.0)
+    for budget in ("much", -3.0, np.nan, np.inf):
+        with pytest.raises(
+            InputError, match=f"energy_budget {budget!r}: choose dissipated, none or a number of joules"
+        ):
+            _run(UNDAMPED, 0.01, 1e-6, budget)

@@ -2,13 +2,16 @@
 
 from __future__ import annotations
 
+from types import SimpleNamespace
+
 import numpy as np
 import pytest
 
 from orchestrator.api import load_scenario
 from orchestrator.coupling.exchange import rate_of
+from orchestrator.coupling.masters.interface_jacobian import InterfaceJacobian
 from orchestrator.coupling.stepping import free_response
-from orchestrator.coupling.stepping.free_response import FreeResponse, Past
+from orchestrator.coupling.stepping.free_response import FreeResponse
 from orchestrator.coupling.stepping.record import PROBE, Record
 from orchestrator.runs.coupled import run_coupled
 
@@ -77,7 +80,7 @@ def _run(free: FreeResponse, node: _Node, h: float, steps: int) -> np.ndarray:
             foretold = free.foretold(h, jacobian) + jacobian[:, 0] * rough[i]
         node.loads.append(rough[i])
         node.show((i + 1) * h, h)
-        free.append(h, Past(free.start, node.outputs.values.copy(), rough[i : i + 1]))
+        free.append(h, free.seen(h, free.start, node.outputs.values.copy(), rough[i : i + 1]))
     return foretold - node.outputs.values
 
 
@@ -107,9 +110,9 @@ def test_two_halves_joined_are_the_whole_step():
     for i in range(2):
         free.begin()
         node.show(0.3 + (i + 1) * H, H)
-        pasts.append(Past(free.start, node.outputs.values.copy(), np.zeros(1)))
+        pasts.append(free.seen(H, free.start, node.outputs.values.copy(), np.zeros(1)))
     whole.show(0.3 + 2 * H, 2 * H)
-    assert np.allclose(free.joined(*pasts, np.zeros(1)).end, whole.outputs.values, atol=1e-14)
+    assert np.allclose(free.joined(2 * H, *pasts, np.zeros(1)).end, whole.outputs.values, atol=1e-14)
 
 
 @pytest.mark.parametrize("k", range(1, free_response.ORDER + 2))
@@ -143,6 +146,26 @@ def test_the_better_beginning_is_chosen_and_the_other_tried_ever_more_rarely():
     assert tried[0] == 0
     assert np.all(np.diff(tried, 2) >= 0)
     assert tried[1] - tried[0] >= PROBE
+
+
+def test_steps_in_the_air_say_nothing_of_either():
+    """Nothing acts, both foretell it exactly: fifteen digits that would count for as many steps after the touch."""
+    record = Record()
+    for by_model in (False, True, True):
+        record.note(by_model=by_model, residual=0.0, iterations=1)
+    assert np.isnan(record.model) and np.isnan(record.polynomial)
+    assert record.asks_models
+
+
+def test_a_record_is_worth_the_less_the_older_it_is():
+    """Expected: models that were bad 32 steps ago, and are good now, win at once; the past weighs 0.8 a step."""
+    record = Record()
+    record.note(by_model=True, residual=1.0, iterations=3)
+    for _ in range(31):
+        record.note(by_model=False, residual=1e-3, iterations=2)
+    record.note(by_model=True, residual=1e-6, iterations=1)
+    assert record.model == pytest.approx(-6.0 * (1.0 - 0.8**32))
+    assert record.models_win
 
 
 def test_pulses_are_made_where_they_pay():
@@ -179,6 +202,26 @@ def test_the_beginning_changes_nothing_but_the_solves(beginnings):
     relative 1e-6 of the motion, times the few periods of the contact's vibration that it lives on."""
     a, b = (run.table["robot.body.position.z"] for run in beginnings.values())
     assert np.max(np.abs(a - b)) < 1e-5 * np.ptp(b)
+
+
+@pytest.mark.parametrize(
+    ("stiffness", "macro_step", "most"), [(1e8, 0.01, 3.44), (1e10, 0.005, 2.82), (1e10, 0.01, 3.60)]
+)
+def test_hard_drops_cost_no_more_solves_than_before_there_were_models(stiffness: float, macro_step: float, most: float):
+    """Expected: the solves of the polynomial alone at a tolerance of 1e-6 (docs/notebook/masters.md), all that is tried and
+    measured on the way included."""
+    hard = {"contact.parameters.stiffness": stiffness}
+    log = run_coupled(load_scenario("drop_5cm", stop=1.0, macro_step=macro_step, set=hard)).log
+    assert log.solves["cable"] / len(log.steps) <= most
+    assert not log.unconverged
+
+
+def test_an_iteration_that_ends_soon_gets_no_new_jacobian():
+    """Expected: three more iterations by a factor of 1e-2 each take 1e-3 below 3e-6; by 0.5 each they do not."""
+    master = SimpleNamespace(max_iterations=10, outer=7, tolerance=3e-6)
+    assert InterfaceJacobian._ends_soon(master, 1e-3, 1e-2)
+    assert not InterfaceJacobian._ends_soon(master, 1e-3, 0.5)
+    assert not InterfaceJacobian._ends_soon(master, 1e-3, 1e200)
 
 
 def test_iterations_say_which_beginning_it_was(beginnings):

@@ -39,7 +39,7 @@ class InterfaceJacobian(Implicit):
     back and stepping the rest alone, by a quasi-Newton iteration whose columns are reused. J comes from
     the FMU's directional derivatives where they foretell a step (`OwnDerivatives`), else from differences with
     rollback, once for each length of step, and is corrected after every outer iteration (Broyden's update,
-    which meets the last difference); it is made anew only when convergence slows.
+    which meets the last difference); it is made anew only when convergence slows, once a step.
 
     Order and stability: those of the exchange. When: the default for contact. Cost: about two steps of the
     modelled components a macro step. Reference: Sicklinger et al., Int. J. Numer. Methods Eng. 98 (2014)
@@ -49,7 +49,7 @@ class InterfaceJacobian(Implicit):
     ----------
     reuse : macro steps whose columns the inner iteration keeps, those of all its solves in a step
     difference : step of the differences, relative to the magnitude of the unknown (at least 1 in its unit)
-    slow : outer iterations after which J is made anew
+    slow : outer iterations after which J is made anew, unless the last one shows that the tolerance is near
     inner_tolerance : residual of the inner iteration, relative to `tolerance`
     inner_iterations : at most
     max_iterations : outer ones before the step is sub-divided; where the linear models fail, halves cost less, and an
@@ -159,7 +159,7 @@ class InterfaceJacobian(Implicit):
             model.last = own, model.free.foretold(H, J) + J @ own
         try:
             r = self._rest_residual(t, H, x, states)
-            found, solved = self._solve_interface(t, H, x, r, self.scale.norm(r, x, H), states, most=WILD)
+            found, solved = self._solve_interface(t, H, x, r, self.tolerance, states, most=WILD)
         except FmuError as error:
             if not error.recoverable:
                 raise
@@ -182,7 +182,10 @@ class InterfaceJacobian(Implicit):
     def _accept(self, t: float, H: float) -> None:
         super()._accept(t, H)
         if self.foresees:
-            past = [Past(m.free.start, m.node.outputs.values.copy(), self.x[m.unknowns].copy()) for m in self.models]
+            past = [
+                m.free.seen(H, m.free.start, m.node.outputs.values.copy(), self.x[m.unknowns].copy())
+                for m in self.models
+            ]
             self._remember(_Piece(t, H, self.x, past))
 
     def _remember(self, piece: _Piece) -> None:
@@ -196,7 +199,7 @@ class InterfaceJacobian(Implicit):
         self.pieces.pop()
         x = joined(self.scale, before.x, piece.x, piece.H)
         past = [
-            m.free.joined(first, second, x[m.unknowns])
+            m.free.joined(2.0 * piece.H, first, second, x[m.unknowns])
             for m, first, second in zip(self.models, before.past, piece.past, strict=True)
         ]
         self._remember(_Piece(before.t, 2.0 * piece.H, x, past))
@@ -218,7 +221,7 @@ class InterfaceJacobian(Implicit):
             model.last = None
             if H not in model.jacobians:
                 self._differentiate(model, t, H, x, states)
-        self.outer, self.last = 0, np.inf
+        self.outer, self.last, self.anew = 0, np.inf, False
 
     def _differentiate(self, model: Model, t: float, H: float, x: np.ndarray, states: list[SavedState]) -> None:
         """Make the Jacobian of one component anew, and leave the component where it was."""
@@ -254,13 +257,22 @@ class InterfaceJacobian(Implicit):
             model.learn(H, x, self.scale.values)
         self.outer += 1
         residual = self.scale.norm(r, x, H)
-        if self.last < np.inf:
-            self.contraction = 0.5 * (self.contraction + min(residual / self.last, WORST))
-        self.last = residual
-        if self.outer == self.slow:
+        shrunk, self.last = residual / self.last, residual
+        if shrunk > 0.0:
+            self.contraction = 0.5 * (self.contraction + min(shrunk, WORST))
+        if self.outer >= self.slow and not self.anew and not self._ends_soon(residual, shrunk):
+            self.anew = True
             for model in self.models:
                 self._differentiate(model, t, H, x, states)
-        return self._solve_interface(t, H, x, r, residual, states)[0]
+        return self._solve_interface(t, H, x, r, self._left(residual), states)[0]
+
+    def _left(self, residual: float) -> float:
+        """Return the residual that the models leave of a `residual`; less than the tolerance is of use for the energy alone."""
+        return max(min(self.tolerance, residual), self.contraction * residual)
+
+    def _ends_soon(self, residual: float, shrunk: float) -> bool:
+        """Return whether the iteration will be below the tolerance in time if it goes on as it has last `shrunk`."""
+        return residual * min(shrunk, 1.0) ** (self.max_iterations - self.outer) <= self.tolerance
 
     def trial(
         self, t: float, H: float, x: np.ndarray, tolerance: float, enough: Callable[[], bool], report: StepReport
@@ -279,7 +291,7 @@ class InterfaceJacobian(Implicit):
                     return False
                 for model in self.models:
                     model.learn(H, x, self.scale.values)
-                x, solved = self._solve_interface(t, H, x, r, self.scale.norm(r, x, H), states)
+                x, solved = self._solve_interface(t, H, x, r, self._left(self.scale.norm(r, x, H)), states)
                 if solved and enough():
                     break
             self.inner.accept()
@@ -293,19 +305,18 @@ class InterfaceJacobian(Implicit):
         H: float,
         x: np.ndarray,
         r: np.ndarray,
-        residual: float,
+        left: float,
         states: list[SavedState],
         most: float = np.inf,
     ) -> tuple[np.ndarray, bool]:
         """Return the unknowns that meet the equation with the models, the best that were found, and whether they do.
 
-        `residual` is the norm of `r`; it is given up where an unknown is `most` times its scale.
+        `r` is the residual of `x`; the models are exact to about `left`, and to solve more exactly is of no use. It is given up
+        where an unknown is `most` times its scale.
         """
-        inner, best, limit = self.inner, (np.inf, x), most * self.scale.values
+        inner, best, limit = self.inner, (np.inf, x), most * self.scale.values if most < np.inf else None
+        residual, target = self.scale.norm(r, x, H), self.inner_tolerance * left
         inner.begin(H, self.scale.values)
-        # the models leave about `contraction` of the residual: to solve more exactly than they are is of no use
-        # (where the energy asks for more than the tolerance, the residual is below that already)
-        target = self.inner_tolerance * max(min(self.tolerance, residual), self.contraction * residual)
         for _ in range(self.inner_iterations):
             if residual < best[0]:
                 best = (residual, x + r)
@@ -313,7 +324,7 @@ class InterfaceJacobian(Implicit):
                 inner.conclude()
                 return x, True
             x = inner.propose(x, r)
-            if np.any(np.abs(x) > limit):
+            if limit is not None and np.any(np.abs(x) > limit):
                 break
             try:
                 r = self._rest_residual(t, H, x, states)

@@ -194,8 +194,10 @@ class _Simulation:
         if loads:
             made = self.work.residual - self.residual
             self.residual[:] = self.work.residual
-            report.power_residual, powers = _largest(made) / self.H, made / self.H
-            report.energy_made = float(np.nansum(made)) if self.work.givers else np.nan
+            powers, booked = made / self.H, self.work.booked
+            if self.work.givers:
+                report.power_residual = float(np.max(np.abs(powers), where=booked, initial=0.0))
+                report.energy_made = float(np.sum(made, where=booked))
         self.made += 1
         self._read(self._time(self.made))
         add(log.reports, report, powers)
@@ -237,12 +239,6 @@ class _Simulation:
         for name, fmu in self.graph.components.items():
             wall, solves = self.before[name]
             log.wall_components[name], log.solves[name] = fmu.wall - wall, fmu.solves - solves
-
-
-def _largest(energies: np.ndarray) -> float:
-    """Return the largest magnitude of those that are booked, nan if none is."""
-    booked = energies[~np.isnan(energies)]
-    return float(np.max(np.abs(booked))) if booked.size else np.nan
 
 
 def _limited(graph: Graph, timeout: float) -> bool:

@@ -30,12 +30,14 @@ class EnergyAccount:
     Parameters
     ----------
     work : books the work; what has no giver that is told the motion is not in the account
-    budget : ``dissipated``: as much as the components that give the loads have dissipated; 0: nothing; ``none``: no limit
+    budget : ``dissipated``: as much as the components that give the loads have dissipated; a number: so much, J; ``none``: no
+        limit
     """
 
     def __init__(self, graph: Graph, work: Work, budget: str | float):
-        if budget not in BUDGETS and budget != 0:
-            raise ValueError(f"energy_budget {budget!r}: choose {', '.join(BUDGETS)} or 0")
+        if budget not in BUDGETS and not _is_energy(budget):
+            raise ValueError(f"energy_budget {budget!r}: choose {', '.join(BUDGETS)} or a number of joules, 0 or more")
+        self.fixed = 0.0 if isinstance(budget, str) else float(budget)
         self.work, self.limited = work, budget != "none" and bool(work.givers)
         givers = work.givers if budget == "dissipated" else []
         self.shown: list[Group] = [
@@ -56,4 +58,8 @@ class EnergyAccount:
         """Return the energy that may have been made by now, J."""
         for group in self.shown:
             group.get()
-        return float(np.sum([group.values[0] for group in self.shown]))
+        return self.fixed + float(np.sum([group.values[0] for group in self.shown]))
+
+
+def _is_energy(budget: object) -> bool:
+    return isinstance(budget, int | float) and not isinstance(budget, bool) and 0.0 <= budget < np.inf

@@ -41,11 +41,13 @@ class Past:
     ----------
     start, end : what was read at its start (n_read,), and the outputs at its end (n_y,)
     x : (m,) unknowns that acted
+    rest : (n_y,) of the outputs at its end, what constant velocity does not explain
     """
 
     start: np.ndarray
     end: np.ndarray
     x: np.ndarray
+    rest: np.ndarray
 
 
 class FreeResponse:
@@ -60,6 +62,7 @@ class FreeResponse:
     ----------
     pulses : length of step → G_1 … G_L side by side, (n_y, L m)
     past : length of step → its last steps, the newest first
+    coasting : length of step → K, (n_y, n_read)
     start : (n_read,) what was read at the start of the step
     """
 
@@ -76,6 +79,7 @@ class FreeResponse:
         """Forget everything."""
         self.pulses: dict[float, np.ndarray] = {}
         self.past: dict[float, tuple[Past, ...]] = {}
+        self.coasting: dict[float, np.ndarray] = {}
 
     def begin(self) -> None:
         """Read what is needed at the start of a step."""
@@ -90,6 +94,10 @@ class FreeResponse:
         """Return by how many steps of this length the rest is known."""
         return max(len(self.past.get(H, ())) - (self.lags(H) if H in self.pulses else 0), 0)
 
+    def seen(self, H: float, start: np.ndarray, end: np.ndarray, x: np.ndarray) -> Past:
+        """Return what there is to remember of a step of length `H`: read at `start` (n_read,), shown at `end` (n_y,)."""
+        return Past(start, end, x, end - self._coasted(start, H))
+
     def append(self, H: float, past: Past) -> None:
         """Remember a step of length `H` that was accepted."""
         self.past[H] = (past, *self.past.get(H, ()))[: ORDER + 1 + self.lags(H)]
@@ -97,13 +105,14 @@ class FreeResponse:
     def foretold(self, H: float, jacobian: np.ndarray) -> np.ndarray:
         """Return the outputs at the end of the step that begins now, without its own loads, (n_y,); J is (n_y, m)."""
         past, lags, m = self.past[H], self.lags(H) if H in self.pulses else 0, jacobian.shape[1]
-        k = min(ORDER + 1, self.known(H))
-        G = np.concatenate([jacobian, self.pulses[H]], axis=1) if lags else jacobian
-        x = np.concatenate([step.x for step in past])
-        loads = np.array([x[i * m : (i + 1 + lags) * m] for i in range(k)])
-        seen = np.array([step.end - self._coasted(step.start, H) for step in past[:k]])
-        rest = _WEIGHTS[k - 1] @ (seen - loads @ G.T)
-        return self._coasted(self.start, H) + rest + G[:, m:] @ x[: lags * m]
+        weights = _WEIGHTS[min(ORDER + 1, self.known(H)) - 1]
+        k, x = weights.size, np.concatenate([step.x for step in past])
+        # what is extrapolated: the rests, less what these loads and the ones before them have done to them
+        loads = weights @ np.array([x[i * m : (i + 1 + lags) * m] for i in range(k)])
+        foretold = (
+            self._coasted(self.start, H) + weights @ np.array([step.rest for step in past[:k]]) - jacobian @ loads[:m]
+        )
+        return foretold + self.pulses[H] @ (x[: lags * m] - loads[m:]) if lags else foretold
 
     def measure(
         self, t: float, H: float, x: np.ndarray, steps: np.ndarray, state: SavedState, between: Between
@@ -141,8 +150,8 @@ class FreeResponse:
             start = self.read.values.copy()
         return np.array(rows)
 
-    def joined(self, first: Past, second: Past, x: np.ndarray) -> Past:
-        """Return two equal steps that follow each other as one, with the unknowns `x` (m,) that stand for both."""
+    def joined(self, H: float, first: Past, second: Past, x: np.ndarray) -> Past:
+        """Return two equal steps that follow each other as one of length `H`, with the unknowns `x` (m,) for both."""
         end, place = second.end.copy(), {name: i for i, name in enumerate(self.node.outputs.names)}
         for name, i in place.items():
             base = base_of(name, MEAN)
@@ -151,11 +160,13 @@ class FreeResponse:
             elif base is not None:
                 before = first.end[place[base]] if is_from_start(base) and base in place else 0.0
                 end[i] = 0.5 * (first.end[i] + before + second.end[i])
-        return Past(first.start, end, x)
+        return self.seen(H, first.start, end, x)
 
     def _coasted(self, start: np.ndarray, H: float) -> np.ndarray:
         """Return the outputs after `H` at constant velocity, (n_y,)."""
-        return self.still @ start + H * (self.moving @ start)
+        if H not in self.coasting:
+            self.coasting[H] = self.still + H * self.moving
+        return self.coasting[H] @ start
 
 
 def _kinematics(names: tuple[str, ...], read: tuple[str, ...]) -> tuple[np.ndarray, np.ndarray]:

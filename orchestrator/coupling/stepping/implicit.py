@@ -41,11 +41,15 @@ DIVERGED = 1e2  # growth of the unknowns, over accepted ones, prediction and its
 
 @dataclass(frozen=True)
 class Iterate:
-    """The unknowns `x` (n,) that an iteration has come to, and their relative residual."""
+    """The unknowns `x` (n,) that an iteration has come to, and their relative residual.
+
+    `near`: whether that is small enough, and only the energy that the step makes is not.
+    """
 
     x: np.ndarray
     residual: float = np.inf
     converged: bool = False
+    near: bool = False
 
 
 class Implicit(Master):
@@ -61,7 +65,8 @@ class Implicit(Master):
     predictor : order of the prediction of the unknowns, or -1: the one that did best lately
     local_tolerance : if positive, sub-steps are made as short as this local error asks for (see `StepControl`)
     energy_budget : energy that the coupling may make: ``dissipated``, what the components that give the loads have dissipated
-        by then (nothing, where they do not show it); ``0``; ``none``, as much as the tolerance lets pass (`EnergyAccount`)
+        by then (nothing, where they do not show it); a number of joules, ``0`` for nothing; ``none``, as much as the
+        tolerance lets pass (`EnergyAccount`). Where no iteration keeps to it the step is divided as if it did not converge
     parallel : components that need nothing of one another in threads: ``auto`` (where it pays), ``always`` or ``never``
     """
 
@@ -221,7 +226,7 @@ class Implicit(Master):
         if found.converged:
             self.x = found.x
         elif keep_best:
-            self._hold(t, H, found.x, states, report)
+            self._hold(t, H, found, states, report)
         return found.converged, found.residual
 
     def _predicted(self, t: float, H: float, states: list[SavedState], report: StepReport) -> np.ndarray:
@@ -258,11 +263,8 @@ class Implicit(Master):
         report: StepReport,
         least: int,
     ) -> Iterate:
-        """Step, compare, correct, roll back, until the residual is small enough, nothing moves or it runs away.
-
-        Where after all iterations only the energy that the step makes is too large, it is taken as it is: the books say so.
-        """
-        best, limit, last = Iterate(x), np.abs(x), Iterate(x)
+        """Step, compare, correct, roll back, until residual and energy are small enough, nothing moves or it runs away."""
+        best, limit = Iterate(x), np.abs(x)
         self.first_residual = np.inf
         for k in range(self.max_iterations):
             r = self._residual(t, H, x, states if k else None, report)
@@ -270,11 +272,11 @@ class Implicit(Master):
                 return best
             residual = self.scale.norm(r, x, H)
             self.first_residual = residual if not k else self.first_residual
+            near = residual <= tolerance and k + 1 >= least
+            if near and (least > 1 or self.account.allows(H)):
+                return Iterate(x, residual, converged=True)
             if residual < best.residual:
-                best = Iterate(x, residual)
-            last = Iterate(x, residual, converged=residual <= tolerance and k + 1 >= least)
-            if last.converged and (least > 1 or self.account.allows(H)):
-                return last
+                best = Iterate(x, residual, near=near)
             scale = self.scale.values.copy()  # that of x: the correction may try wild unknowns
             if not k:
                 limit = DIVERGED * np.maximum(scale, np.abs(x))
@@ -284,7 +286,7 @@ class Implicit(Master):
             x = following
             if not np.all(np.abs(x) <= limit):
                 break
-        return last if last.converged else best
+        return best
 
     def _begin(self, t: float, H: float, x: np.ndarray, states: list[SavedState]) -> None:
         """Prepare for the iteration of a step that starts at the unknowns `x`."""
@@ -294,10 +296,11 @@ class Implicit(Master):
         """Return the next iterate."""
         return self.accelerator.propose(x, r)
 
-    def _hold(self, t: float, H: float, x: np.ndarray, states: list[SavedState], report: StepReport) -> None:
-        """Last resort: make the step with the best iterate held (the rates of loads zero)."""
-        x = x.copy()
-        x[np.isin(self.places, self.loads.fed[:, 1])] = 0.0
+    def _hold(self, t: float, H: float, best: Iterate, states: list[SavedState], report: StepReport) -> None:
+        """Last resort: make the step with the best iterate, held (the rates of loads zero) if it is not even near."""
+        x = best.x.copy()
+        if not best.near:
+            x[np.isin(self.places, self.loads.fed[:, 1])] = 0.0
         if self._residual(t, H, x, states, report) is None:
             raise self.failure or AssertionError
         self.x = x

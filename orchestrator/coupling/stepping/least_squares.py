@@ -115,21 +115,25 @@ class LeastSquares(Accelerator):
     def begin(self, H: float, scale: np.ndarray) -> None:
         """Start a step, or another solve of it: columns of earlier ones, of the same length, come after its own."""
         self.H, self.weights = H, 1.0 / scale
-        self.new, self.last, self.columns = 0, None, 0
-        old = [*self.solved, *((V, W) for length, V, W in self.past if length == H)]
-        need = self.depth + sum(len(V) for V, _ in old)
-        if need > len(self.V):
-            self._allocate(2 * need)
-        # rows depth - new … depth are those of this step, newest first; the old ones follow
-        self.end = self.depth
-        for V, W in old:
-            rows = slice(self.end, self.end + len(V))
-            self.V[rows], self.W[rows] = V, W
-            self.end += len(V)
+        self.new, self.last, self.columns, self.end = 0, None, 0, -1
+
+    def _gather(self) -> None:
+        """Put the columns of earlier solves where they are used: rows depth - new … depth are those of this one, newest first;
+        the old ones follow."""
+        old = [*self.solved, *((V, W) for length, V, W in self.past if length == self.H)]
+        self.end = self.depth + sum(len(V) for V, _ in old)
+        if self.end > len(self.V):
+            self._allocate(2 * self.end)
+        if old:
+            rows = slice(self.depth, self.end)
+            np.concatenate([V for V, _ in old], out=self.V[rows])
+            np.concatenate([W for _, W in old], out=self.W[rows])
 
     def propose(self, x: np.ndarray, r: np.ndarray) -> np.ndarray:
         """Return the next iterate from x (n,) and its residual r (n,)."""
         mixed = x + self.mixing * r
+        if self.end < 0:  # a solve that ends at once needs none
+            self._gather()
         if self.last is not None and self.new < self.depth:
             self.new += 1
             row = self.depth - self.new

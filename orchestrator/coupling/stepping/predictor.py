@@ -3,6 +3,7 @@
 from __future__ import annotations
 
 from collections import deque
+from math import prod
 
 import numpy as np
 
@@ -28,14 +29,14 @@ class Predictor:
     def reset(self) -> None:
         """Forget everything."""
         self.points: deque[tuple[float, np.ndarray]] = deque(maxlen=HIGHEST + 1)
-        self.predictions: list[np.ndarray] = []
+        self.predictions = np.zeros((0, 0))  # (orders, n), of the step that is being made
         self.errors = np.zeros(HIGHEST + 1)
 
-    def save(self) -> tuple[list, list, np.ndarray]:
+    def save(self) -> tuple[list, np.ndarray, np.ndarray]:
         """Return what `restore` needs."""
         return list(self.points), self.predictions, self.errors.copy()
 
-    def restore(self, saved: tuple[list, list, np.ndarray]) -> None:
+    def restore(self, saved: tuple[list, np.ndarray, np.ndarray]) -> None:
         """Go back."""
         points, self.predictions, errors = saved
         self.points = deque(points, maxlen=HIGHEST + 1)
@@ -43,29 +44,29 @@ class Predictor:
 
     def append(self, time: float, x: np.ndarray, scale: np.ndarray) -> None:
         """Remember the converged unknowns `x` (n,), of magnitudes `scale` (n,), of the step around `time`."""
-        for k, guess in enumerate(self.predictions):
-            error = (guess - x) / scale
-            self.errors[k] = FORGET * self.errors[k] + np.sqrt(error @ error)
+        if len(self.predictions):
+            missed = (self.predictions - x) / scale
+            k = len(missed)
+            self.errors[:k] = FORGET * self.errors[:k] + np.sqrt(np.sum(missed * missed, axis=1))
         self.points.appendleft((time, x.copy()))
 
     def predict(self, time: float, fallback: np.ndarray) -> np.ndarray:
         """Return the unknowns expected in the step around `time`; `fallback` while nothing is known."""
         if not self.points:
             return fallback.copy()
-        nodes = [(t - time, x) for t, x in self.points]
-        self.predictions = [_extrapolate(nodes[: k + 1]) for k in range(len(nodes))]
+        weights = _weights([t - time for t, _ in self.points])
+        self.predictions = weights @ np.array([x for _, x in self.points])
         if self.order >= 0:
-            return self.predictions[min(self.order, len(nodes) - 1)]
-        return self.predictions[int(np.argmin(self.errors[: max(1, len(nodes) - 1)]))]
+            return self.predictions[min(self.order, len(weights) - 1)]
+        return self.predictions[int(np.argmin(self.errors[: max(1, len(weights) - 1)]))]
 
 
-def _extrapolate(nodes: list[tuple[float, np.ndarray]]) -> np.ndarray:
-    """Return the value at 0 of the polynomial through `nodes` (Lagrange)."""
-    total = np.zeros_like(nodes[0][1])
-    for i, (s, x) in enumerate(nodes):
-        weight = 1.0
-        for j, (other, _) in enumerate(nodes):
-            if j != i:
-                weight *= other / (other - s)
-        total += weight * x
-    return total
+def _weights(nodes: list[float]) -> np.ndarray:
+    """Return what the values at the `nodes` (k,) weigh in the value at 0 of the polynomial through the first 1 … k (Lagrange),
+    a row each, (k, k)."""
+    weights = np.zeros((len(nodes), len(nodes)))
+    for order in range(len(nodes)):
+        for i, s in enumerate(nodes[: order + 1]):
+            others = [other for j, other in enumerate(nodes[: order + 1]) if j != i]
+            weights[order, i] = prod(other / (other - s) for other in others)
+    return weights

@@ -24,7 +24,8 @@ class Record:
     ----------
     model, polynomial : digits of the residuals that iterations began with, the past fading; nan: not tried yet
     steps, iterations : steps made, and how many iterations they need, the past fading
-    pause, tried : steps until the models are tried again, and the step when they were
+    pause : steps until the models are tried again
+    tried, left : the last steps that began from the models, and from the polynomial
     """
 
     model: float = np.nan
@@ -33,6 +34,7 @@ class Record:
     iterations: float = 1.0
     pause: int = PROBE
     tried: int = 0
+    left: int = 0
 
     @property
     def models_win(self) -> bool:
@@ -48,11 +50,13 @@ class Record:
         """Remember the residual that a step began with, and the iterations it took."""
         self.steps += 1
         self.iterations = FORGET * self.iterations + (1.0 - FORGET) * iterations
+        if residual <= LEAST:  # in the air there is nothing to foretell: good for both, and soon no longer true
+            return
         digits = float(np.log10(np.clip(residual, LEAST, LARGEST)))
         if not by_model:
-            self.polynomial = _faded(self.polynomial, digits)
+            self.polynomial, self.left = _faded(self.polynomial, digits, self.steps - self.left), self.steps
             return
-        self.model = _faded(self.model, digits)
+        self.model = _faded(self.model, digits, self.steps - self.tried)
         self.tried, self.pause = self.steps, PROBE if self.models_win else 2 * self.pause
 
     def pays(self, cost: float, remaining: float) -> bool:
@@ -64,5 +68,7 @@ class Record:
         return self.models_win and self.steps * saved >= cost and not remaining * saved < PAYS * cost
 
 
-def _faded(past: float, value: float) -> float:
-    return value if np.isnan(past) else FORGET * past + (1.0 - FORGET) * value
+def _faded(past: float, value: float, age: int) -> float:
+    """Return the mean of a `value` and of the `past`, that is so many steps old."""
+    weight = 0.0 if np.isnan(past) else FORGET**age
+    return value + weight * (past - value) if weight else value

@@ -12,7 +12,7 @@ of Sadjina et al., Engineering with Computers 33 (2017) 607-620 (ECCO).
 
 from __future__ import annotations
 
-from collections.abc import Iterator
+from collections.abc import Iterator, Mapping, Sequence
 from dataclasses import dataclass
 from typing import Any
 
@@ -21,95 +21,42 @@ import numpy as np
 from orchestrator.coupling.exchange import LOADS, MEAN, RATE, motion_of, split, suffixed, tangent_of
 from orchestrator.coupling.fmu.group import Group
 from orchestrator.coupling.graph.graph import Graph, Node
+from orchestrator.coupling.kernel import kernel
 
 TINY = np.finfo(float).tiny
-_Books = tuple[np.ndarray, np.ndarray, list[Any]]
-"""Totals, residuals, and what each interface starts its next step from."""
+AXES = 3  # components of a load; one with fewer has places -1 for the rest
+BEFORE, TOLD, GIVEN = slice(2, 5), slice(5, 8), slice(8, 11)
+"""Rows of the books after totals and residuals, what a step starts from: the motion, as the giver was told it, its load."""
+ALL = slice(None)
 
 
-@dataclass
-class _Giver:
-    """The other side of an interface: the component that gives the load and is told the motion.
+@dataclass(frozen=True)
+class _Interface:
+    """One load and its motion: where their components (three, or fewer) are found.
 
     Attributes
     ----------
-    name : of the component
-    motion, mean : (m,) places in Graph.u where it is told motion and mean; `mean` may be empty
-    rates : (m,) places in Graph.u of the slopes that it gives; empty: its load is that of an instant, linear between
+    name : of the load, ``cable.port[1].force``
+    loads, rates : places in Graph.u; of the rates in Graph.r where the master sets them (`own`); none where there are none
+    motion, mean : variables of the component; no means where it has none
+    giver : the component that gives all of the load and is told all of the motion; empty where there is none
+    told, told_mean : places in Graph.u where that one is told motion and mean
+    given_rates : places in Graph.u of the slopes that it gives; none: its load is that of an instant, linear between
     from_start, turned : whether the motion is counted from the start of the step; whether it is a tangent that turns
-    load, before : (m,) at the start of the step
     """
 
     name: str
-    motion: np.ndarray
-    mean: np.ndarray
-    rates: np.ndarray
+    loads: list[int]
+    rates: list[int]
+    own: bool
+    motion: list[str]
+    mean: list[str]
+    giver: str
+    told: list[int]
+    told_mean: list[int]
+    given_rates: list[int]
     from_start: bool
     turned: bool
-    load: np.ndarray
-    before: np.ndarray
-
-    def start(self, graph: Graph, loads: np.ndarray) -> None:
-        """Begin at the present values."""
-        self.load = graph.gathered(loads)
-        self.before = np.zeros(loads.size) if self.from_start else graph.u[self.motion]
-
-    def work(self, graph: Graph, loads: np.ndarray, H: float) -> float:
-        """Return the work that it says it has done on the receiver in this step, J."""
-        given, shown = graph.gathered(loads), graph.acted[self.motion]
-        x0, x1 = _moved(self.before, shown, self.turned)
-        if not self.rates.size:
-            total = 0.5 * (given + self.load).dot(x1 - x0)
-        else:
-            total = given.dot(x1 - x0)
-            if self.mean.size:
-                slope, mean = graph.gathered(self.rates), _moved(self.before, graph.acted[self.mean], self.turned)[1]
-                total += slope.dot(H / 2 * (x0 + x1) - H * mean)
-        self.load = given
-        if not self.from_start:
-            self.before = shown
-        return float(total)
-
-
-@dataclass
-class _Interface:
-    """One load and its motion; places are columns of the arrays of `Work`."""
-
-    name: str
-    loads: np.ndarray  # (m,) places in Graph.u
-    rates: np.ndarray  # (m,) places in Graph.u, in Graph.r where the master sets them, or empty
-    own: bool  # whether the master sets the rates
-    motion: Group
-    mean: Group | None
-    from_start: bool  # whether the motion is counted from the start of the step
-    turned: bool  # whether it is a tangent that turns
-    before: np.ndarray  # (m,) the motion at the start of the step
-    giver: _Giver | None  # None where the source of the load is not told the motion
-
-    def work(self, graph: Graph, H: float) -> float:
-        """Return the work of the step that has just been made, J."""
-        self.motion.get()
-        u, slopes = graph.acted, graph.r if self.own else graph.acted
-        x0, x1 = _moved(self.before, self.motion.values, self.turned)
-        total = u.take(self.loads).dot(x1 - x0)
-        if self.mean is not None and self.rates.size:
-            self.mean.get()
-            mean = _moved(self.before, self.mean.values, self.turned)[1]
-            total += slopes.take(self.rates).dot(H / 2 * (x0 + x1) - H * mean)
-        if not self.from_start:
-            self.before = self.motion.values.copy()
-        return total
-
-    def remembered(self) -> tuple[np.ndarray, ...]:
-        """Return what the next step starts from."""
-        giver = self.giver
-        return (self.before,) if giver is None else (self.before, giver.before, giver.load)
-
-    def remember(self, values: tuple[np.ndarray, ...]) -> None:
-        """Go back to what was `remembered`."""
-        self.before = values[0]
-        if self.giver is not None:
-            self.giver.before, self.giver.load = values[1:]
 
 
 class Work:
@@ -121,60 +68,83 @@ class Work:
     total : (len(names),) J, since `start`
     residual : (len(names),) J, since `start`: `total` less what the giver of the load has booked; nan where that one is
         not told the motion
+    booked : (len(names),) whether both sides are
+    givers : the components that give such loads
     """
 
     def __init__(self, graph: Graph):
         self.graph = graph
-        self.interfaces = [interface for node in graph.nodes for interface in _interfaces(graph, node)]
+        found = [(node, interface) for node in graph.nodes for interface in _interfaces(graph, node)]
+        self.interfaces = [interface for _, interface in found]
         self.names = [interface.name for interface in self.interfaces]
-        self.total = np.zeros(len(self.names))
-        self.residual = np.zeros(len(self.names))
-        self._tried: _Books | None = None
+        self.givers = list(dict.fromkeys(i.giver for i in self.interfaces if i.giver))
+        self._place(found)
+        self._books, self._x = np.zeros((2 + 3 * AXES, len(self.names))), np.zeros((3, AXES))
+        self.total, self.residual = self._books[0], self._books[1]
+        self._tried: np.ndarray | None = None
+
+    def _place(self, found: list[tuple[Node, _Interface]]) -> None:
+        """Find the places of all that is read: of loads and slopes among the links, of motions among what is shown."""
+        shown: dict[str, dict[str, None]] = {}
+        for node, one in found:
+            shown.setdefault(node.name, {}).update(dict.fromkeys([*one.motion, *one.mean]))
+        place = {signal: i for i, signal in enumerate((c, name) for c, names in shown.items() for name in names)}
+        self._shown, first = np.zeros(len(place)), 0
+        self._groups: list[Group] = []
+        for component, names in shown.items():
+            buffer = self._shown[first : first + len(names)]
+            self._groups.append(self.graph.components[component].group(list(names), buffer))
+            first += len(names)
+
+        def motions(names: list[str], node: Node) -> list[int]:
+            return [place[node.name, name] for name in names]
+
+        interfaces = [one for _, one in found]
+        self._loads = _rows([one.loads for one in interfaces])
+        self._rates = _rows([one.rates for one in interfaces])
+        self._given_rates = _rows([one.given_rates for one in interfaces])
+        self._told = _rows([one.told for one in interfaces])
+        self._told_mean = _rows([one.told_mean for one in interfaces])
+        self._motion = _rows([motions(one.motion, node) for node, one in found])
+        self._mean = _rows([motions(one.mean, node) for node, one in found])
+        kinds = [(one.own, one.from_start, one.turned, bool(one.giver)) for one in interfaces]
+        self._kinds = np.array(kinds, dtype=np.bool_).reshape(-1, 4)
+        self._from_start, self.booked = self._kinds[:, 1], self._kinds[:, 3]
 
     def start(self) -> None:
         """Begin at the present positions."""
-        self.total[:] = 0.0
-        for i, interface in enumerate(self.interfaces):
-            interface.motion.get()
-            interface.before = (
-                np.zeros(interface.loads.size) if interface.from_start else interface.motion.values.copy()
-            )
-            self.residual[i] = np.nan if interface.giver is None else 0.0
-            if interface.giver is not None:
-                interface.giver.start(self.graph, interface.loads)
+        self._tried = None
+        self._read()
+        books = self._books
+        books[:] = 0.0
+        self.residual[~self.booked] = np.nan
+        still = ~self._from_start
+        books[BEFORE] = still * _taken(self._shown, self._motion)
+        books[TOLD] = still * _taken(self.graph.u, self._told)
+        books[GIVEN] = self.booked * _taken(self.graph.gathered(ALL), self._loads)
 
-    def save(self) -> _Books:
+    def _read(self) -> None:
+        for group in self._groups:
+            group.get()
+
+    def save(self) -> np.ndarray:
         """Return what `restore` needs."""
-        return self.total.copy(), self.residual.copy(), [interface.remembered() for interface in self.interfaces]
+        return self._books.copy()
 
-    def restore(self, saved: _Books) -> None:
+    def restore(self, saved: np.ndarray) -> None:
         """Go back: the steps booked since are not made."""
         self._tried = None
-        self.total[:], self.residual[:], remembered = saved
-        for interface, values in zip(self.interfaces, remembered, strict=True):
-            interface.remember(values)
-
-    @property
-    def made(self) -> float:
-        """Energy that all booked interfaces have made since `start`, J."""
-        return float(np.nansum(self.residual))
-
-    @property
-    def givers(self) -> list[str]:
-        """The components that give loads and are told the motion, so that what is made can be told."""
-        return list(dict.fromkeys(i.giver.name for i in self.interfaces if i.giver is not None))
+        self._books[:] = saved
 
     def tried(self, H: float) -> float:
         """Return the energy that all booked interfaces will have made if the step just made is accepted, J.
 
         What would be booked is kept: the next call takes it, unless `forget` says that it was not accepted.
         """
-        saved = self.save()
-        self._book(H)
-        tried, made = self.save(), self.made
-        self.restore(saved)
+        tried = self.save()
+        self._book(H, tried)
         self._tried = tried
-        return made
+        return float(np.sum(tried[1], where=self.booked))
 
     def forget(self) -> None:
         """The step that was `tried` is not accepted as it is."""
@@ -185,14 +155,93 @@ class Work:
         if self._tried is not None:
             self.restore(self._tried)
         else:
-            self._book(h)
+            self._book(h, self._books)
 
-    def _book(self, h: float) -> None:
-        for i, interface in enumerate(self.interfaces):
-            work = interface.work(self.graph, h)
-            self.total[i] += work
-            if interface.giver is not None:
-                self.residual[i] += work - interface.giver.work(self.graph, interface.loads, h)
+    def _book(self, h: float, books: np.ndarray) -> None:
+        graph = self.graph
+        self._read()
+        book(
+            h, graph.acted, graph.r, graph.gathered(ALL), self._shown, self._loads, self._rates, self._motion,
+            self._mean, self._told, self._told_mean, self._given_rates, self._kinds, self._x, books,
+        )  # fmt: skip
+
+
+@kernel
+def book(h, acted, slopes, given, shown, loads, rates, motion, mean, told, told_mean, given_rates, kinds, x, books):
+    """Add the work of a step of length `h` to the `books`: of each interface as its receiver and as its giver have it.
+
+    Parameters
+    ----------
+    acted, given : (n_u,) inputs that acted in the step, and what their givers say
+    slopes, shown : (n_r,), (n_shown,) slopes set by the master, and motions and means that components show
+    loads, rates, motion, mean, told, told_mean, given_rates : (n, 3) places of what `_Interface` names, -1: there is none
+    kinds : (n, 4) own, from_start, turned, whether there is a giver
+    x : (3, 3) workspace: the motion at the start, at the end, its mean
+    books : (11, n) changed
+    """
+    for i in range(loads.shape[0]):
+        from_start, turned, known = kinds[i, 1], kinds[i, 2], kinds[i, 3]
+        done = 0.0
+        for side in range(2 if known else 1):
+            receives = side == 0
+            slopes_known = rates[i, 0] >= 0 if receives else given_rates[i, 0] >= 0
+            moments = slopes_known and (mean[i, 0] >= 0 if receives else told_mean[i, 0] >= 0)
+            first = 2 + 3 * side
+            for k in range(3):
+                x[0, k], x[1, k], x[2, k] = books[first + k, i], 0.0, 0.0
+                if loads[i, k] >= 0:
+                    x[1, k] = shown[motion[i, k]] if receives else acted[told[i, k]]
+                    if moments:
+                        x[2, k] = shown[mean[i, k]] if receives else acted[told_mean[i, k]]
+                if not from_start:
+                    books[first + k, i] = x[1, k]
+            if turned:  # the rotation vector from g to h is the angle between them about g x h
+                for j in range(1, 3):
+                    g0, g1, g2, h0, h1, h2 = x[0, 0], x[0, 1], x[0, 2], x[j, 0], x[j, 1], x[j, 2]
+                    sizes = max(np.sqrt((g0 * g0 + g1 * g1 + g2 * g2) * (h0 * h0 + h1 * h1 + h2 * h2)), TINY)
+                    a0, a1, a2 = (g1 * h2 - g2 * h1) / sizes, (g2 * h0 - g0 * h2) / sizes, (g0 * h1 - g1 * h0) / sizes
+                    sine = np.sqrt(a0 * a0 + a1 * a1 + a2 * a2)
+                    angle = np.arctan2(sine, (g0 * h0 + g1 * h1 + g2 * h2) / sizes)
+                    factor = angle / sine if sine > 0.0 else 1.0
+                    x[j, 0], x[j, 1], x[j, 2] = a0 * factor, a1 * factor, a2 * factor
+                x[0, 0], x[0, 1], x[0, 2] = 0.0, 0.0, 0.0
+            work = 0.0
+            for k in range(3):
+                if loads[i, k] < 0:
+                    continue
+                load = acted[loads[i, k]] if receives else given[loads[i, k]]
+                if not receives:
+                    before = books[8 + k, i]
+                    books[8 + k, i] = load
+                    if not slopes_known:
+                        load = 0.5 * (load + before)
+                work += load * (x[1, k] - x[0, k])
+                if moments:
+                    if not receives:
+                        slope = given[given_rates[i, k]]
+                    elif kinds[i, 0]:
+                        slope = slopes[rates[i, k]]
+                    else:
+                        slope = acted[rates[i, k]]
+                    work += slope * (0.5 * h * (x[0, k] + x[1, k]) - h * x[2, k])
+            if receives:
+                done = work
+                books[0, i] += work
+            else:
+                books[1, i] += done - work
+
+
+def _rows(places: list[list[int]]) -> np.ndarray:
+    """Return the places of all interfaces, (n, AXES), -1 where there is none."""
+    found = np.full((len(places), AXES), -1, dtype=np.intp)
+    for row, some in zip(found, places, strict=True):
+        row[: len(some)] = some
+    return found
+
+
+def _taken(values: np.ndarray, places: np.ndarray) -> np.ndarray:
+    """Return the `values` at `places` (n, AXES) as rows of the books, (AXES, n); zero where there is no place."""
+    return np.where(places >= 0, values[places], 0.0).T if values.size else np.zeros(places.T.shape)
 
 
 def _interfaces(graph: Graph, node: Node) -> Iterator[_Interface]:
@@ -217,21 +266,6 @@ def _all_shown(node: Node, names: list[str]) -> bool:
     return all(name in ports and ports[name].causality == "output" for name in names)
 
 
-def _moved(before: np.ndarray, shown: np.ndarray, turned: bool) -> tuple[np.ndarray, np.ndarray]:
-    """Return what a load does work on, at the start and as it is `shown`; of a tangent that has `turned`: its rotation.
-
-    The rotation vector from g to h is the angle between them about g × h.
-    """
-    if not turned:
-        return before, shown
-    sizes = float(np.sqrt(before.dot(before) * shown.dot(shown)))
-    (a, b, c), (d, e, f) = before.tolist(), shown.tolist()  # a tenth of the time of np.cross
-    axis = np.array([b * f - c * e, c * d - a * f, a * e - b * d]) / max(sizes, TINY)
-    sine = float(np.sqrt(axis.dot(axis)))
-    angle = float(np.arctan2(sine, before.dot(shown) / max(sizes, TINY)))
-    return np.zeros(3), axis * (angle / sine if sine > 0.0 else 1.0)
-
-
 @dataclass(frozen=True)
 class _Names:
     """The variables of an interface, the components of a vector each."""
@@ -251,43 +285,38 @@ class _Names:
 def _interface(graph: Graph, node: Node, stem: str, names: _Names, from_start: bool, *, turned: bool) -> _Interface:
     fed = {name: node.first + i for i, name in enumerate(node.inputs.names)}
     free = {name: i for i, (part, name) in enumerate(graph.free_rates) if part == node.name}
-    by_master = all(name in free for name in names.rates)
-    place = free if by_master else fed
-    loads, rates = (np.array([fed[n] for n in some if n in fed], dtype=np.intp) for some in (names.loads, names.rates))
+    own = all(name in free for name in names.rates)
+    loads, giver = [fed[name] for name in names.loads], _giver_of(graph, node, names)
+    told = _told(graph, node, names.motions, giver)
     return _Interface(
-        f"{node.name}.{stem}",
-        loads,
-        np.array([place[name] for name in names.rates if name in place], dtype=np.intp),
-        by_master,
-        node.fmu.group(names.motions),
-        node.fmu.group(names.means) if all(name in node.fmu.ports for name in names.means) else None,
-        from_start,
-        turned,
-        np.zeros(loads.size),
-        _giver(graph, node, names, loads, rates, from_start, turned),
+        name=f"{node.name}.{stem}",
+        loads=loads,
+        rates=_places(names.rates, free if own else fed),
+        own=own,
+        motion=names.motions,
+        mean=names.means if all(name in node.fmu.ports for name in names.means) else [],
+        giver=giver if told else "",
+        told=told,
+        told_mean=_told(graph, node, names.means, giver),
+        given_rates=_places(names.rates, fed),
+        from_start=from_start,
+        turned=turned,
     )
 
 
-def _giver(
-    graph: Graph, node: Node, names: _Names, loads: np.ndarray, rates: np.ndarray, from_start: bool, turned: bool
-) -> _Giver | None:
-    """Return the other side: one component that gives all of the load and is told all of the motion, or None."""
-    givers = {graph.links[i].source[0] for i in loads}
-    if len(givers) != 1:
-        return None
-    told = {link.source: i for i, link in enumerate(graph.links) if link.target[0] in givers}
-    motion, mean = (
-        np.array([told[node.name, name] for name in some if (node.name, name) in told], dtype=np.intp)
-        for some in (names.motions, names.means)
-    )
-    if motion.size < loads.size:
-        return None
-    zero = np.zeros(loads.size)
-    return _Giver(
-        next(iter(givers)), motion, _whole(mean, loads.size), _whole(rates, loads.size), from_start, turned, zero, zero
-    )
+def _giver_of(graph: Graph, node: Node, names: _Names) -> str:
+    """Return the one component that gives all of the load; empty where there are several."""
+    fed = {name: node.first + i for i, name in enumerate(node.inputs.names)}
+    givers = {graph.links[fed[name]].source[0] for name in names.loads}
+    return givers.pop() if len(givers) == 1 else ""
 
 
-def _whole(places: np.ndarray, m: int) -> np.ndarray:
-    """Return `places` (m,), or none of them where some are missing."""
-    return places if places.size == m else places[:0]
+def _told(graph: Graph, node: Node, names: list[str], giver: str) -> list[int]:
+    """Return the places in Graph.u where the giver is told the outputs `names` of a component; none if some are missing."""
+    told = {link.source: i for i, link in enumerate(graph.links) if link.target[0] == giver}
+    return _places([(node.name, name) for name in names], told)
+
+
+def _places(names: Sequence[Any], place: Mapping[Any, int]) -> list[int]:
+    """Return the places of all `names`, or of none of them where some are missing."""
+    return [place[name] for name in names] if all(name in place for name in names) else []
