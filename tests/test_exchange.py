@@ -1,7 +1,7 @@
 """The exchanges within a macro step, through FMUs, graph and master: stability, order, work, contact.
 
 The masses are exact under a force that is linear in time, so that all error is the exchange's. Expected values: the
-amplification matrices of docs/concepts/exchange_derived.md in closed form, the (2,2) Padé approximant of the
+amplification matrices of docs/methods/exchange.md in closed form, the (2,2) Padé approximant of the
 exponential, solutions by `solve_ivp` to 1e-12.
 """
 
@@ -250,7 +250,7 @@ def bounce(step: float, **law: float) -> np.ndarray:
 @pytest.mark.parametrize(("exponent", "stiffness", "order"), [(1.0, 1e4, 1.8), (1.5, 3e4, 2.3), (2.5, 3e5, 3.5)])
 def test_order_across_touch_and_lift_off(exponent, stiffness, order):
     """The events fall anywhere in the step; slope over eight steps. With exact integrals the order is 4; the Gauss rule
-    across the kink leaves a small part of order exponent + 1 (docs/concepts/exchange_derived.md), which is the bound."""
+    across the kink leaves a small part of order exponent + 1 (docs/methods/exchange.md), which is the bound."""
 
     def right(t, y):
         return y[1], -1e3 * y[0] - stiffness * max(y[0], 0.0) ** exponent

@@ -2,7 +2,7 @@
 
 Landing from touch (`landing_200m_point9`) to 0.3 s. The order is the slope of the error of z against the monolithic
 solver between two macro steps: 10 and 5 ms for `waveform` and `hermite`, 5 and 2.5 ms for `point` joined by an implicit
-master, below 1.25 ms for explicit masters. Expected: docs/concepts/exchange_derived.md. Tolerance: cable step and
+master, below 1.25 ms for explicit masters. Expected: docs/methods/exchange.md. Tolerance: cable step and
 reference leave 1e-8, against a coupling error of 5e-8 at 5 ms, so that an order of 4 is seen to within log2(1.2) on
 either step.
 """

@@ -38,7 +38,7 @@ def instance(
 class SubStepped(Fmu):
     """An FMU that makes `steps` equal communication steps in each step of the master, for whom it looks like any other.
 
-    *Inputs* within the step follow from their names, as everywhere (docs/concepts/exchange_derived.md). A load with a slope is
+    *Inputs* within the step follow from their names, as everywhere (docs/methods/exchange.md). A load with a slope is
     F + Ḟ (tau - t - H/2), and is given as mean and slope over each sub-step. So that any real input has one, it gets
     an input ``_rate`` here if the FMU has none: masters then set it as they do for other FMUs, by their own rule of
     extrapolation or interpolation. A motion with a mean is the quadratic through start, end and mean; an FMU that
