@@ -95,10 +95,10 @@ class Case:
         stop: float | None = None,
         exchange: str | None = None,
     ) -> Scenario:
-        """Return the scenario with another master, macro step and end (s), and another exchange."""
-        changes = {"simulation.exchange": exchange} if exchange else None
+        """Return the scenario with another master, macro step and end (s), and another exchange; it shows the signals alone."""
         stop = self.stop if stop is None else stop
-        return load_scenario(CASES / f"{self.name}.toml", set=changes, master=master, macro_step=macro_step, stop=stop)
+        one = load_scenario(CASES / f"{self.name}.toml", master=master, macro_step=macro_step, stop=stop)
+        return one.changed(record=list(self.signals), **({"exchange": exchange} if exchange else {}))
 
     @property
     def times(self) -> np.ndarray:

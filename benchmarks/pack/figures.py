@@ -20,7 +20,7 @@ CONTESTANTS = [(ours.NAME, master) for master in (*ours.IMPLICIT, *ours.EXPLICIT
 CONTESTANTS += [(name, "explicit") for name in TITLES if name != ours.NAME]
 """Each has the same line in all pictures."""
 COSTS = {
-    "solves_a_second": "Solves of {expensive} a simulated second [1/s]",
+    "solves_a_second": "Solves of {expensive!r} a simulated second [1/s]",
     "cpu": "CPU time a simulated second [s/s]",
 }
 LEAST = 1e-12
@@ -40,7 +40,7 @@ def _drawn(path: Path, part: Mapping[str, Any]) -> Path:
             for i, contestant in enumerate(CONTESTANTS):
                 _line(axis, part, contestant, cost, i)
             _reference(axis, part)
-            axis.set_xlabel(label.format(expensive=f"the {part['expensive']}"))
+            axis.set_xlabel(label.format(expensive=part["expensive"]))
             axis.xaxis.set_major_locator(LogLocator(subs=(1.0, 2.0, 5.0)))
             axis.xaxis.set_major_formatter("{x:g}")
             axis.xaxis.set_minor_locator(NullLocator())

@@ -9,6 +9,7 @@ from typing import Any
 
 from benchmarks.pack.case import Case
 from benchmarks.pack.cases import CASES
+from benchmarks.pack.contest import TITLES
 from orchestrator.coupling.run.results import read_json, write_json
 
 DOCS = Path(__file__).resolve().parents[2] / "docs"
@@ -25,10 +26,15 @@ def merged(found: dict[str, Any], case: Case, engines: Sequence[str], rows: Iter
         "expensive": case.expensive,
         "reference": {"method": reference.method, "error": reference.relative_error()},
         "python": platform.python_version(),
-        "rows": [*rows, *kept],
+        "rows": sorted([*rows, *kept], key=_place),
     }
     both = found | {case.name: part}
     return {name: both[name] for name in CASES if name in both}
+
+
+def _place(one: dict[str, Any]) -> int:
+    """Return where a row's engine stands among all."""
+    return list(TITLES).index(one["engine"])
 
 
 def add(case: Case, engines: Sequence[str], rows: Sequence[dict[str, Any]], file: Path = FILE) -> None:

@@ -13,7 +13,7 @@ CASE = Case(
     grid=0.02,
     implicit=(0.01, 0.005, 0.0025),
     explicit=(0.002, 0.001),
-    others=(0.001, 0.0005),
+    others=(0.002, 0.001),
     quick=0.5,
     solution=monolithic,
 )

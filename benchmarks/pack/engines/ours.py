@@ -6,6 +6,7 @@ from collections.abc import Iterator
 from time import process_time
 
 from benchmarks.pack.case import Case
+from benchmarks.pack.engines.child import timed
 from benchmarks.pack.engines.run import Run
 from orchestrator.coupling import Interval, Log, simulate
 from orchestrator.coupling.errors import InputError, RunError
@@ -30,7 +31,7 @@ def run(case: Case, master: str, macro_step: float, stop: float) -> Run:
     try:
         _simulated(case.scenario(master=master, macro_step=macro_step, stop=2.0 * macro_step), case, 1)
         scenario = case.scenario(master=master, macro_step=macro_step, stop=stop)
-        log, solves, cpu = _simulated(scenario, case, case.every(macro_step))
+        (log, solves), cpu = timed(lambda: _simulated(scenario, case, case.every(macro_step)))
     except (InputError, RunError) as error:
         return Run(NAME, master, macro_step, {}, why=str(error))
     if log.error is not None:
@@ -38,8 +39,8 @@ def run(case: Case, master: str, macro_step: float, stop: float) -> Run:
     return Run(NAME, master, macro_step, dict(log.table), solves, cpu, log.unconverged)
 
 
-def _simulated(scenario: Scenario, case: Case, every: int) -> tuple[Log, int, float]:
-    """Return the log, the steps of the expensive component, and the CPU time of the loop, s."""
+def _simulated(scenario: Scenario, case: Case, every: int) -> tuple[tuple[Log, int], float]:
+    """Return the log and the steps of the expensive component, and the CPU time of the loop, s."""
     simulation = scenario.simulation
     with opened(scenario) as graph:
         master = master_of(scenario, graph)
@@ -47,7 +48,7 @@ def _simulated(scenario: Scenario, case: Case, every: int) -> tuple[Log, int, fl
         times = simulation.start_time, simulation.stop_time, simulation.macro_step
         log = simulate(graph, master, *times, list(case.signals), interval=Interval(every))
         cpu = process_time() - begin[0] if begin else 0.0
-        return log, graph.components[case.expensive].solves, cpu
+        return (log, graph.components[case.expensive].solves), cpu
 
 
 def _begin(master: Master) -> list[float]:
