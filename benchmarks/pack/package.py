@@ -32,7 +32,8 @@ def written(case: Case, folder: Path) -> Path:
 
 
 def _exported(case: Case, place: Path, kind: str) -> Exported:
-    step = max(case.others if kind == "explicit" else case.implicit)
+    # inner steps are made for this macro step: the longest means one inner step each, the shortest is good for all
+    step = max(case.others) if kind == "explicit" else min(case.implicit)
     scenario = case.scenario(master="jacobi", macro_step=step, exchange=EXCHANGES[kind])
     return export(scenario, ssp_file=place / f"{kind}.ssp", osp_folder=place / kind)
 
