@@ -16,9 +16,11 @@ from benchmarks.pack.contest import TITLES, Extent, contested
 from orchestrator.coupling.errors import InputError, RunError, nearest
 
 app = typer.Typer(add_completion=False, help=__doc__, pretty_exceptions_enable=False)
+AT_ONCE = ("ours", "ecos")
+"""Engines of a short run, if none is asked for."""
 Cases = Annotated[list[str] | None, typer.Option("--case", help=f"a case, or several: {', '.join(CASES)}")]
 Engines = Annotated[list[str] | None, typer.Option("--engine", help=f"an engine, or several: {', '.join(TITLES)}")]
-Quick = Annotated[bool, typer.Option("--quick", help="short runs, few steps; nothing is written")]
+Quick = Annotated[bool, typer.Option("--quick", help=f"short runs of {' and '.join(AT_ONCE)}; nothing is written")]
 
 
 @app.callback(invoke_without_command=True)
@@ -26,7 +28,7 @@ def run(ctx: typer.Context, case: Cases = None, engine: Engines = None, quick: Q
     """Run cases with engines; write docs/benchmarks.json, the page's tables and its pictures."""
     if ctx.invoked_subcommand is not None:
         return
-    engines = _chosen(engine, TITLES, "engine")
+    engines = _chosen(engine or (list(AT_ONCE) if quick else None), TITLES, "engine")
     for one in _cases(case):
         rows = [_shown(one, row) for row in contested(one, engines, Extent(quick))]
         if not quick:
