@@ -1,4 +1,4 @@
-# make env | page | run | test | test-wheel | lint | docs | measure | reproduce | verify | bench
+# make env | page | run | test | test-wheel | lint | docs | measure | reproduce | verify | bench | pack
 # The interpreter is the first of PYTHON, python3, python3.13, python3.12, python3.11 that is 3.11 or newer.
 
 SHELL := /bin/bash
@@ -9,7 +9,7 @@ STAMP := $(VENV)/.installed
 
 export OPENBLAS_NUM_THREADS ?= 1
 
-.PHONY: env page run test test-generic test-portable test-wheel lint docs measure reproduce verify bench clean
+.PHONY: env page run test test-generic test-portable test-wheel lint docs measure reproduce verify bench pack clean
 
 env: $(STAMP) $(VENV)/.page-tried
 
@@ -110,6 +110,10 @@ bench: env
 	  echo "== $$name"; $(BIN)/python -m "benchmarks.$$name" || failed="$$failed $$name"; \
 	done; \
 	if [ -n "$$failed" ]; then echo "make: benchmarks that failed:$$failed" >&2; exit 1; fi
+
+# the public benchmark pack: docs/benchmarks.json, and docs/benchmarks.md from it
+pack: env
+	$(BIN)/python -m benchmarks.pack
 
 clean:
 	rm -rf $(VENV) build dist $(WEB)/dist $(WEB)/node_modules
