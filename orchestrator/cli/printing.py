@@ -106,12 +106,13 @@ def print_limits(limits: Limits) -> None:
 
 def _print_estimates(run: Run) -> None:
     """Print the estimated error of each signal judged by its parts, as shares of its range."""
-    from orchestrator.runs.errors import NAMES, range_of
+    from orchestrator.runs.errors import NAMES, RIGHT, range_of
 
     if not run.error_parts:
         return
     covered = next(iter(run.error_parts.values())).covered
-    print(f"estimated error, by the signal's range; it covers {', '.join(covered)}")
+    often = RIGHT[run.summary["estimate"]]
+    print(f"estimated error, by the signal's range, right within a factor 3 in {often}; it covers {', '.join(covered)}")
     rows = [_error_row(name, parts, range_of(run.table[name]), run) for name, parts in run.error_parts.items()]
     print_table(("signal", *NAMES.values(), "sum", "allowed", "verdict"), rows)
     if run.estimate_failure:
@@ -119,13 +120,15 @@ def _print_estimates(run: Run) -> None:
 
 
 def _error_row(name: str, parts: Parts, scale: float, run: Run) -> tuple[str, ...]:
+    from orchestrator.runs.errors import verdict_on
+
     shares = [None if part is None else part / scale for part in parts.by_part.values()]
     cells = ["–" if share is None else _share(share) for share in (*shares, parts.total / scale)]
     tolerance = run.tolerances.get(name)
     if tolerance is None:
         return (name, *cells, "", "")
-    verdict = "not known" if isnan(parts.total) else "within" if parts.total <= tolerance * scale else "MISSED"
-    return (name, *cells, f"{tolerance:g}", verdict)
+    verdict = verdict_on(parts, tolerance * scale, bool(run.estimate_doubts))
+    return (name, *cells, f"{tolerance:g}", "MISSED" if verdict == "missed" else verdict)
 
 
 def _share(share: float) -> str:

@@ -55,6 +55,7 @@ class Coupled:
     fmus : file and SHA-256 of every component, and whether it had a process of its own
     error_parts : estimated error of each signal judged; empty where no estimate was asked for
     estimate_failure : which parts of it failed, and why
+    estimate_doubts : why no calibration speaks for it, a line each
     notes : what of the wiring its author may not expect, and who ended it before its time, a line each
     messages : of the FMUs that have said anything, by component
     stopped : number of the signal that has asked the process to end while the error was estimated; 0 if none has
@@ -69,6 +70,7 @@ class Coupled:
     fmus: dict[str, dict[str, str | bool]]
     error_parts: dict[str, Parts] = field(default_factory=dict)
     estimate_failure: str = ""
+    estimate_doubts: list[str] = field(default_factory=list)
     notes: list[str] = field(default_factory=list)
     messages: Mapping[str, Messages] = field(default_factory=dict)
     stopped: int = 0

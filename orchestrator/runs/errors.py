@@ -21,6 +21,8 @@ PEAK = re.compile(r"contact\d+\.normal_force_max")
 MESH_ORDER = 3
 """Order of the error in the element length that is reckoned with: 4 where the motion is smooth, less where an impact makes
 waves shorter than the elements."""
+RIGHT = {"finer": "19 of 20 cases (4 of 5 peak forces)", "coarser": "3 of 5 cases"}
+"""Estimate → in how many cases of its calibration it is within a factor 3 (docs/notebook/estimate.md)."""
 Differences = dict[str, float]
 """Signal → largest difference, in its unit."""
 NAMES = {"coupling": "coupling and macro step", "inner_steps": "inner steps", "mesh": "mesh"}
@@ -102,6 +104,14 @@ def missed(parts: Mapping[str, Parts], tolerances: Mapping[str, float], table: M
     """Return the signals whose error is larger than their tolerance allows."""
     judged = [name for name in tolerances if name in parts and name in table]
     return [name for name in judged if parts[name].total > tolerances[name] * range_of(table[name])]
+
+
+def verdict_on(parts: Parts, allowed: float, doubtful: bool) -> str:
+    """Return ``within``, ``missed`` or ``not known``; ``doubtful`` is what would be within, where no calibration speaks for
+    it. `allowed` has the signal's unit."""
+    if np.isnan(parts.total):
+        return "not known"
+    return "missed" if parts.total > allowed else "doubtful" if doubtful else "within"
 
 
 def judged(table: Table, tolerances: Iterable[str]) -> list[str]:

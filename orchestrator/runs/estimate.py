@@ -14,7 +14,7 @@ steps and mesh (docs/concepts/error.md).
 from __future__ import annotations
 
 import signal
-from collections.abc import Callable, Sequence
+from collections.abc import Callable, Container, Sequence
 from pathlib import Path
 from typing import Any
 
@@ -42,6 +42,9 @@ OF_INNER_STEPS = 1.0 / (1.0 - 0.5**3)
 BEGINNING, ENOUGH, TRIFLE = 0.2, 20, 0.03
 """Share of a run, of so many macro steps at least, whose inner steps are looked at first; where they have less than this
 share of the error, or of the tolerance, the rest is spared."""
+ROUGH = 'by a coarser run an estimate is often three times too small on a line; estimate = "finer" is not'
+GROSS = 0.5
+"""Error, by the signal's range, beyond which the difference of two runs says that both are wrong, and no more."""
 MESH_TOLERANCE = 1e-6
 """m; local error of a monolithic step, which leaves 3e-7 of the flagship's range: a hundredth of what a mesh leaves."""
 Found = dict[str, Differences | None]
@@ -90,8 +93,14 @@ def _options(scenario: Scenario, ratio: float) -> dict[str, Any]:
     return dict(scenario.master) | {n: all_options[n] * change for n, change in by.items() if all_options.get(n)}
 
 
-def estimate_error(coupled: Coupled, told: Told = lambda _: lambda _: None) -> Coupled | None:
+def estimate_error(
+    coupled: Coupled, told: Told = lambda _: lambda _: None, parts: Container[str] = frozenset(NAMES)
+) -> Coupled | None:
     """Estimate the parts of a finished run's error, and note them in `coupled`; a failure is noted, not raised.
+
+    Parameters
+    ----------
+    parts : those that are wanted, of `NAMES`
 
     Returns
     -------
@@ -107,12 +116,24 @@ def estimate_error(coupled: Coupled, told: Told = lambda _: lambda _: None) -> C
         "mesh": lambda: _of_mesh(coupled, told(NAMES["mesh"])),
         "inner_steps": lambda: _of_inner_steps(coupled, second_run, found, told(NAMES["inner_steps"])),
     }
-    for part, make in makers.items():
+    for part, make in ((name, make) for name, make in makers.items() if name in parts):
         found[part], goes_on = _attempted(coupled, part, make)
         if not goes_on:
             break
     coupled.error_parts = {n: _parts([(found.get(part) or {}).get(n) for part in NAMES]) for n in coupled.judged}
+    coupled.estimate_doubts = [line for run in second_run for line in doubts(coupled, run)]
     return second_run[0] if second_run else None
+
+
+def doubts(coupled: Coupled, second_run: Coupled) -> list[str]:
+    """Return what makes an estimate one that no calibration speaks for, a line each."""
+    bad = second_run.log.unconverged
+    lines = [ROUGH] if coupled.scenario.simulation.estimate == "coarser" else []
+    lines += [f"{bad} macro steps of the second run did not converge"] if bad else []
+    large = [n for n, parts in coupled.error_parts.items() if parts.total >= GROSS * range_of(coupled.table[n])]
+    return lines + [
+        f"the error of {name} is half its range or more: so far apart two runs tell no error" for name in large
+    ]
 
 
 def _attempted(coupled: Coupled, part: str, make: Callable[[], Differences | None]) -> tuple[Differences | None, bool]:
@@ -144,9 +165,13 @@ def _of_coupling(coupled: Coupled, again: System, kept: Kept, progress: Reached)
 
 
 def _of_inner_steps(coupled: Coupled, second_run: Kept, found: Found, progress: Reached) -> Differences | None:
-    """Return the errors of the inner steps; None where no component has them, or a coarser run has shown them already."""
-    again = coupled.system.stepped(0.5)
-    if coupled.scenario.simulation.estimate == "coarser" or again.scenario == coupled.scenario:
+    """Return the errors of the inner steps; None where no component has them, or the second run has shown them already.
+
+    A finer run shows those that are longer than its macro steps, since it shortens them.
+    """
+    system, finer = coupled.system, 0.5 * coupled.scenario.simulation.macro_step
+    again = system.stepped(0.5, longest=finer)
+    if coupled.scenario.simulation.estimate == "coarser" or again.scenario == system.stepped(1.0).scenario:
         return None
     steps = int(BEGINNING * (len(coupled.table["time"]) - 1))
     if second_run and found["coupling"] is not None and steps >= ENOUGH:
@@ -166,7 +191,7 @@ def _where_small(
     What they are of the coupling's there they are taken to be in the end.
     """
     end = coupled.table["time"][steps]
-    begun, second_begun = (_until(table, end) for table in (coupled.table, second_run.table))
+    begun, second_begun = (until(table, end) for table in (coupled.table, second_run.table))
     brief = completed(again.changed(dict(coupled.scenario.master), stop_time=float(end)), progress).table
     names = coupled.judged
     inner, coupling = differences(begun, brief, names), differences(begun, second_begun, names)
@@ -182,7 +207,7 @@ def _where_small(
     return errors
 
 
-def _until(table: Table, end: float) -> Table:
+def until(table: Table, end: float) -> Table:
     """Return the rows of a table up to the time `end`."""
     rows = table["time"] <= end * (1.0 + 1e-9)
     return {name: values[rows] for name, values in table.items()}

@@ -134,6 +134,11 @@ class Run:
         return self.summary["estimate_failure"]
 
     @property
+    def estimate_doubts(self) -> list[str]:
+        """Why no calibration speaks for the estimated errors, a line each; empty where one does."""
+        return self.summary.get("estimate_doubts", [])
+
+    @property
     def error(self) -> str | None:
         """Why the run ended before its time; None if it did not."""
         return self.manifest.get("error")
@@ -206,6 +211,7 @@ class Run:
         lines += [_unresolved(impact) for impact in self.summary.get("unresolved_impacts", [])]
         lines += [f"{drift}{self._other_master()}"] if drift is not None else []
         lines += self.summary["warnings"]
+        lines += [f"estimated error: not calibrated for this run, {why}" for why in self.estimate_doubts]
         lines += [self._missed(name) for name in missed(self.error_parts, self.tolerances, self.table)]
         lines += [f"{self.error}; the results up to there are kept"] if self.error else []
         lines += [self.safety] if self.safe is False else []

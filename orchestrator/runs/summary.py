@@ -68,6 +68,7 @@ def summary(coupled: Coupled) -> dict[str, Any]:
         "estimate": scenario.simulation.estimate,
         "estimated_error": {name: parts.content() for name, parts in coupled.error_parts.items()},
         "estimate_failure": coupled.estimate_failure,
+        "estimate_doubts": coupled.estimate_doubts,
         "interface_balance": interface_balance(coupled.table, log.energy),
         "fmu_warnings": {name: m.warnings for name, m in coupled.messages.items() if m.warnings},
         "units": {"time": "s"} | {name: log.units[name] for name in coupled.table if name in log.units},

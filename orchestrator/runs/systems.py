@@ -134,8 +134,9 @@ class System(Protocol):
         """Return it with other options of the master and other simulation settings (macro_step, …)."""
         ...
 
-    def stepped(self, ratio: float) -> System:
-        """Return it with the inner steps of all components that have them `ratio` times as long, whatever the macro step."""
+    def stepped(self, ratio: float, longest: float = np.inf) -> System:
+        """Return it with the inner steps of all components that have them `ratio` times as long, whatever the macro step;
+        those above the `longest` (s) stay."""
         ...
 
     def meshed(self, ratio: float = MESH_RATIO) -> Meshed | None:
@@ -234,13 +235,16 @@ class LandingSystem:
         """Return it with other options of the master and other simulation settings; the start stays as it is."""
         return LandingSystem(self.landing.changed(self.scenario.changed(dict(options), **simulation)))
 
-    def stepped(self, ratio: float) -> LandingSystem:
+    def stepped(self, ratio: float, longest: float = np.inf) -> LandingSystem:
         """Return it with other inner steps, whatever the macro step."""
         known, cable, robot = self.landing.sources.variables, self.scenario.cable, self.scenario.robot
         if cable.fmu is None and INNER_STEP not in cable.parameters:
             step = inner_step(self.landing, EXCHANGES[self.exchange])
             cable = cable.model_copy(update={"parameters": cable.parameters | {INNER_STEP: step}})
-        sections = {"cable": _scaled(cable, known["cable"], ratio), "robot": _scaled(robot, known["robot"], ratio)}
+        sections = {
+            "cable": _scaled(cable, known["cable"], ratio, longest),
+            "robot": _scaled(robot, known["robot"], ratio, longest),
+        }
         return LandingSystem(self.landing.changed(self.scenario.model_copy(update=sections)))
 
     def meshed(self, ratio: float = MESH_RATIO) -> Meshed | None:
@@ -372,9 +376,9 @@ class GraphSystem:
     def meshed(self, ratio: float = MESH_RATIO) -> None:
         """Return None: nothing is known of the mesh of a component."""
 
-    def stepped(self, ratio: float) -> GraphSystem:
+    def stepped(self, ratio: float, longest: float = np.inf) -> GraphSystem:
         """Return it with other inner steps."""
-        components = {n: _scaled(c, self.variables[n], ratio) for n, c in self.scenario.components.items()}
+        components = {n: _scaled(c, self.variables[n], ratio, longest) for n, c in self.scenario.components.items()}
         return replace(self, scenario=self.scenario.model_copy(update={"components": components}))
 
 
@@ -426,12 +430,13 @@ def _silent(graph: Graph) -> list[str]:
     return ['no FMU has a numeric output: choose local variables, [simulation] record = ["component.variable"]']
 
 
-def _scaled(section: Stepped, known: Variables, ratio: float) -> Stepped:
-    """Return the section of a component with its inner step `ratio` times as long, if it has one."""
+def _scaled(section: Stepped, known: Variables, ratio: float, longest: float) -> Stepped:
+    """Return the section of a component with its inner step `ratio` times as long, if it has one, and no longer one."""
     if INNER_STEP not in known or known[INNER_STEP].causality != "parameter":
         return section
     step = float(section.parameters.get(INNER_STEP, known[INNER_STEP].start))
-    return section.model_copy(update={"parameters": section.parameters | {INNER_STEP: ratio * step}})
+    scaled = ratio * step if step <= longest * (1.0 + 1e-9) else step
+    return section.model_copy(update={"parameters": section.parameters | {INNER_STEP: scaled}})
 
 
 def _kept(connections: Iterable[Connection], components: Mapping[str, Fmu]) -> list[Connection]:

@@ -6,9 +6,6 @@ from functools import cache
 from pathlib import Path
 from typing import NamedTuple
 
-from orchestrator.coupling.run.compare import communication_times
-from orchestrator.landing.build import problem
-from orchestrator.landing.monolithic.solve import Solution, solve
 from orchestrator.runs.compare import Reference
 from orchestrator.runs.coupled import Coupled, run_coupled
 from orchestrator.runs.reference import solve_reference
@@ -34,26 +31,13 @@ LANDINGS = {
     "inclined rig": Landing("rig_10m_inclined"),
     "two wheels": Landing("landing_200m_point9", "hybrid_robot_2"),
 }
-FORTY = ("landing.position=40.0", "cable.parameters.grading_position=40.0")
-OTHERS = {
-    "rig": Landing("rig_10m"),
-    "10 kg": Landing("landing_200m_point9", "fptlir_10kg"),
-    "hard drop, k = 1e10": Landing("drop_5cm", settings=("contact.parameters.stiffness=1e10",)),
-    "100 kg, 40 m from the tower": Landing("landing_200m_point9_undamped", "fptlir_100kg", FORTY),
-    "two wheels, another robot": Landing("landing_200m_point9", "hybrid_robot_1"),
-}
-"""Landings that no choice of the coupling was made by."""
 STOP = 1.2
 SIGNALS = ("robot.body.position.z", "robot.roll")
 
 
-TRUTH = 1e-11
-"""m, local tolerance of the solution that small errors are judged by."""
-
-
 def scenario(landing: str, master: str | None = None, macro_step: float | None = None, *more: str) -> Scenario:
     """Return a landing over `STOP` s with another master, macro step, and `more` settings."""
-    file, robot, settings = (LANDINGS | OTHERS)[landing]
+    file, robot, settings = LANDINGS[landing]
     times = [f"simulation.stop_time={STOP}"]
     times += [f"simulation.macro_step={macro_step!r}"] if macro_step else []
     return load(FOLDER / f"{file}.toml", [*settings, *times, *more], robot, master)
@@ -63,13 +47,6 @@ def scenario(landing: str, master: str | None = None, macro_step: float | None =
 def reference(landing: str, macro_steps: tuple[float, ...]) -> Reference:
     """Return the monolithic solution at the communication points of all `macro_steps`."""
     return solve_reference(scenario(landing), macro_steps)
-
-
-@cache
-def truth(landing: str, macro_steps: tuple[float, ...]) -> Solution:
-    """Return the same with a local tolerance of 1e-11 m, to judge small errors by."""
-    one = scenario(landing)
-    return solve(lambda: problem(one), communication_times(STOP, macro_steps), TRUTH)
 
 
 def coupled(landing: str, master: str, macro_step: float) -> Coupled:

@@ -14,7 +14,7 @@ from orchestrator.landing.safety import VERDICTS, why_not_judged
 from orchestrator.report.page.html import Cell, Html, card, folded, pairs, seek, table, tag
 from orchestrator.report.page.tiles import measured
 from orchestrator.report.signals import LABELS, in_the_air
-from orchestrator.runs.errors import NAMES, Parts, range_of
+from orchestrator.runs.errors import NAMES, RIGHT, Parts, range_of, verdict_on
 from orchestrator.runs.result import Run
 
 PEAKS = (
@@ -111,9 +111,17 @@ def errors(run: Run, reference: Mapping[str, Parts] | None = None) -> Html:
         return Html()
     lines = [_error_row(name, one, range_of(run.table[name]), run) for name, one in parts.items() if name in run.table]
     head = ("signal", *NAMES.values(), "sum", "allowed", "verdict")
-    said = tag("p", "As shares of the signal's range, largest over the run.", class_="muted")
+    said = tag(
+        "p", f"As shares of the signal's range, largest over the run{_how_often(run, reference)}.", class_="muted"
+    )
     why = tag("p", f"not known: {run.estimate_failure}") if run.estimate_failure else Html()
     return card("errors", "Errors by part", (said, table(head, lines), why))
+
+
+def _how_often(run: Run, reference: Mapping[str, Parts] | None) -> str:
+    """Return how often such an estimate is right; nothing of errors that were measured."""
+    often = RIGHT.get(run.summary.get("estimate", ""), "")
+    return f"; estimated, within a factor 3 in {often}" if reference is None and often else ""
 
 
 def _error_row(name: str, parts: Parts, scale: float, run: Run) -> tuple[str, ...]:
@@ -122,8 +130,7 @@ def _error_row(name: str, parts: Parts, scale: float, run: Run) -> tuple[str, ..
     tolerance = run.tolerances.get(name)
     if tolerance is None:
         return name, *cells, "", ""
-    known = "within" if parts.total <= tolerance * scale else "missed"
-    return name, *cells, f"{tolerance:g}", "not known" if np.isnan(parts.total) else known
+    return name, *cells, f"{tolerance:g}", verdict_on(parts, tolerance * scale, bool(run.estimate_doubts))
 
 
 def exponent(share: float, digits: int = 1) -> str:
