@@ -55,8 +55,8 @@ run: env
 	$(BIN)/orchestrator build
 	$(BIN)/orchestrator compare landing_200m_point9_physical
 
-# files of tests side by side, on as many processors as there are, but no more than four
-PYTEST := $(BIN)/python -m pytest -n auto --maxprocesses 4 --dist loadfile
+# files of tests side by side, on as many processors as there are, but no more than four; long ones first (tests/conftest.py)
+PYTEST := $(BIN)/python -m pytest -n auto --maxprocesses 4 --dist loadfile --no-loadscope-reorder
 
 test: env
 	@$(BIN)/python -m fmus.face.first_use

@@ -19,6 +19,7 @@ from orchestrator.runs.coupled import run_coupled
 from orchestrator.scenario.read import load
 from tests.scenarios import LANDING, OSCILLATOR, ROOT, exact_oscillator
 
+pytestmark = pytest.mark.usefixtures("coarse_pictures")
 SHORT = {"stop": 0.2, "estimate": "none"}
 
 
@@ -31,7 +32,7 @@ def oscillator(tmp_path_factory) -> orchestrator.Run:
 def comparison(tmp_path_factory) -> orchestrator.Comparison:
     out = tmp_path_factory.mktemp("api") / "comparison"
     steps, masters = [0.02, 0.01], ["iqn_ils", "gauss_seidel"]
-    return orchestrator.compare(OSCILLATOR, masters=masters, macro_steps=steps, stop=0.2, out=out)
+    return orchestrator.compare(OSCILLATOR, masters=masters, macro_steps=steps, stop=0.2, out=out, pictures=False)
 
 
 def same(a: dict[str, np.ndarray], b: dict[str, np.ndarray]) -> bool:
@@ -140,7 +141,7 @@ def test_a_loaded_scenario_gives_the_same_as_its_file():
 
 def test_python_and_the_command_line_give_the_same(oscillator: orchestrator.Run, tmp_path: Path):
     command = [sys.executable, "-m", "orchestrator", "run", str(OSCILLATOR), "--stop", "0.5", "--out", "out", "--quiet"]
-    subprocess.run(command, cwd=tmp_path, env={**os.environ, "PYTHONPATH": str(ROOT)}, check=True)
+    subprocess.run([*command, "--no-pictures"], cwd=tmp_path, env={**os.environ, "PYTHONPATH": str(ROOT)}, check=True)
     assert same(orchestrator.load_run(tmp_path / "out").table, oscillator.table)
 
 
@@ -190,7 +191,7 @@ def test_a_run_that_fails_on_its_way_is_returned(tmp_path: Path):
     zero = {f"components.{s}.parameters.{k}": 0.0 for s in ("left", "right") for k in ("stiffness", "damping")}
     zero |= {f"components.right.parameters.coupling_{k}": 0.0 for k in ("stiffness", "damping")}
     fast = zero | {"components.left.parameters.initial_velocity": 1e308}
-    run = orchestrator.run(OSCILLATOR, set=fast, master="jacobi", out=tmp_path / "out")
+    run = orchestrator.run(OSCILLATOR, set=fast, master="jacobi", out=tmp_path / "out", pictures=False)
     assert (run.verdict, run.exit_status) == ("failed", 3) and 1.5 < run.time[-1] < 2.0
     assert run.error is not None and "left" in run.error and run.warnings[-1].startswith(run.error)
     read = orchestrator.load_run(tmp_path / "out")
@@ -273,7 +274,7 @@ def test_a_reference_that_fails_keeps_the_runs(tmp_path: Path, monkeypatch):
 
     monkeypatch.setattr(reference, "completed", fail)
     with pytest.raises(Unfinished, match="no reference today") as error:
-        orchestrator.compare(OSCILLATOR, stop=0.1, out=tmp_path / "out")
+        orchestrator.compare(OSCILLATOR, stop=0.1, out=tmp_path / "out", pictures=False)
     assert error.value.directory == tmp_path / "out" and len(error.value.runs) == 1
     assert orchestrator.load_run(tmp_path / "out" / "iqn_ils_0.01s").verdict == "within"
     assert json.loads((tmp_path / "out" / "manifest.json").read_text())["complete"] is False

@@ -21,9 +21,11 @@ from orchestrator.coupling.run.results import read_fields, read_table
 from orchestrator.landing.contract import check_variables, is_met
 from orchestrator.runs.coupled import run_coupled
 from orchestrator.scenario.read import load
+from tests.command import orchestrate
 from tests.fmus import build
 from tests.scenarios import LANDING, OSCILLATOR, ROOT, exact_oscillator
 
+pytestmark = pytest.mark.usefixtures("coarse_pictures")
 COMMAND = [sys.executable, "-m", "orchestrator"]
 
 
@@ -32,10 +34,10 @@ def shipped_fmu(name: str) -> Path:
     return robot_fmu(load_robot(name)) if name in catalogue() else module_fmu(name)
 
 
-def orchestrate(*arguments: object, timeout: float = 300.0) -> subprocess.CompletedProcess[str]:
+def launched(*arguments: object) -> subprocess.CompletedProcess[str]:
     """Run the command line in a process of its own; there is never a traceback."""
     command = [*COMMAND, *map(str, arguments)]
-    done = subprocess.run(command, cwd=ROOT, capture_output=True, text=True, timeout=timeout)
+    done = subprocess.run(command, cwd=ROOT, capture_output=True, text=True, timeout=300.0)
     assert "Traceback" not in done.stderr, done.stderr
     return done
 
@@ -47,13 +49,13 @@ def manifest(directory: Path) -> dict:
 @pytest.fixture(scope="module")
 def oscillator_run(tmp_path_factory) -> tuple[subprocess.CompletedProcess[str], Path]:
     out = tmp_path_factory.mktemp("runs") / "oscillator"
-    return orchestrate("run", OSCILLATOR, "--out", out, "--stop", 2, "--timeout", 60), out
+    return launched("run", OSCILLATOR, "--out", out, "--stop", 2, "--timeout", 60), out
 
 
 @pytest.fixture(scope="module")
 def landing_run(tmp_path_factory) -> tuple[subprocess.CompletedProcess[str], Path]:
     out = tmp_path_factory.mktemp("runs") / "landing"
-    return orchestrate("run", LANDING, "--out", out, "--stop", 0.05, "--quiet"), out
+    return launched("run", LANDING, "--out", out, "--stop", 0.05, "--quiet"), out
 
 
 def test_help_imports_nothing_heavy():
@@ -63,7 +65,7 @@ def test_help_imports_nothing_heavy():
 
 
 def test_help_names_every_command():
-    done = orchestrate("--help")
+    done = launched("--help")
     assert done.returncode == 0
     assert all(name in done.stdout for name in ("build", "list", "validate", "check", "run", "compare", "report"))
 
@@ -88,8 +90,8 @@ def test_new_files_are_valid_and_never_overwritten(tmp_path: Path):
 def test_a_robot_s_file_gives_the_same_as_the_catalogue(landing_run, tmp_path: Path):
     """By name, from another folder; a robot that changes nothing."""
     (tmp_path / "same.toml").write_text('extends = "fptlir"')
-    arguments = ["run", LANDING.stem, "--robot", "same.toml", "--out", "out", "--stop", "0.05", "--quiet"]
-    done = subprocess.run([*COMMAND, *arguments], cwd=tmp_path, capture_output=True, text=True)
+    arguments = ["--robot", "same.toml", "--out", "out", "--stop", 0.05, "--quiet", "--no-pictures"]
+    done = orchestrate("run", LANDING.stem, *arguments, folder=tmp_path)
     assert done.returncode == 0, done.stderr
     ours, theirs = read_table(landing_run[1] / "results.csv"), read_table(tmp_path / "out" / "results.csv")
     assert all(np.array_equal(ours[name], theirs[name]) for name in ours)
@@ -98,7 +100,16 @@ def test_a_robot_s_file_gives_the_same_as_the_catalogue(landing_run, tmp_path: P
 
 def test_another_mass_is_answered_once_with_its_inertia(tmp_path: Path):
     mass = 'robot.parameters.mass={ value = 76000, unit = "g" }'
-    options = ["--out", tmp_path / "out", "--stop", 0.01, "--quiet", "--masters", "jacobi,gauss_seidel"]
+    options = [
+        "--out",
+        tmp_path / "out",
+        "--stop",
+        0.01,
+        "--quiet",
+        "--no-pictures",
+        "--masters",
+        "jacobi,gauss_seidel",
+    ]
     done = orchestrate("compare", LANDING.stem, *options, "--set", mass)
     assert done.returncode in (0, 1), done.stderr
     assert done.stderr.count("robot.parameters.mass: inertia scaled by 2 with the mass") == 1
@@ -117,7 +128,7 @@ def test_wrong_input_ends_with_status_2_and_leaves_nothing(command: str, tmp_pat
 
 @pytest.mark.parametrize("arguments", [["run"], ["fly"], ["run", OSCILLATOR, "--macro-step", "fast"]])
 def test_wrong_usage_ends_with_status_2(arguments: list[str]):
-    assert orchestrate(*arguments).returncode == 2
+    assert launched(*arguments).returncode == 2
 
 
 @pytest.mark.parametrize("command", ["run", "compare"])
@@ -175,7 +186,8 @@ PAIR = ("--masters", "iqn_ils,nepce")
 
 def test_compare_orders_verdict_and_report(tmp_path: Path):
     out = tmp_path / "comparison"
-    done = orchestrate("compare", OSCILLATOR, "--out", out, "--stop", 1, "--macro-steps", "0.02,0.01", "--quiet", *PAIR)
+    options = ["--stop", 1, "--macro-steps", "0.02,0.01", "--quiet", "--no-pictures"]
+    done = launched("compare", OSCILLATOR, "--out", out, *options, *PAIR)
     content = json.loads((out / "comparison.json").read_text())
     assert done.stderr == "" and done.returncode == (0 if content["verdict"] == "pass" else 1)
     assert [run["macro_step"] for run in content["runs"]] == [0.02, 0.01, 0.02, 0.01]
@@ -186,7 +198,7 @@ def test_compare_orders_verdict_and_report(tmp_path: Path):
     estimate = content["reference"]["estimated_error"]["left.position"]
     assert np.max(np.abs(table["left.position"] - exact[0])) <= estimate
     assert manifest(out / "iqn_ils_0.01s")["complete"] is True
-    shutil.rmtree(out / "plots")
+    assert not (out / "plots").exists()
     done = orchestrate("report", out)
     assert done.returncode == 0 and (out / "report.html").is_file() and (out / "plots" / "convergence.png").is_file()
 
@@ -195,6 +207,9 @@ def test_a_missed_tolerance_ends_with_status_1(tmp_path: Path):
     options = ["--stop", 0.5, "--set", "simulation.tolerances.left.position=1e-9"]
     done = orchestrate("compare", OSCILLATOR, "--out", tmp_path / "out", *options)
     assert done.returncode == 1 and "FAIL" in done.stdout
+    assert {"plots", "iqn_ils_0.01s/plots"} <= {
+        str(p.parent.relative_to(tmp_path / "out")) for p in tmp_path.rglob("*.png")
+    }
 
 
 def test_a_failure_in_mid_run_keeps_the_results(tmp_path: Path):
@@ -203,7 +218,7 @@ def test_a_failure_in_mid_run_keeps_the_results(tmp_path: Path):
     zero += ["components.right.parameters.coupling_stiffness=0.0", "components.right.parameters.coupling_damping=0.0"]
     options = [text for key in [*zero, "components.left.parameters.initial_velocity=1e308"] for text in ("--set", key)]
     out = tmp_path / "out"
-    done = orchestrate("run", OSCILLATOR, "--out", out, "--master", "jacobi", *options)
+    done = orchestrate("run", OSCILLATOR, "--out", out, "--master", "jacobi", "--no-pictures", *options)
     assert done.returncode == 3 and "left" in done.stderr
     content = manifest(out)
     assert content["complete"] is False and "left" in content["error"]
@@ -225,7 +240,7 @@ commands.main(sys.argv[1:])
 @pytest.mark.skipif(os.name == "nt", reason="no SIGINT for one process there")
 def test_ctrl_c_keeps_the_results(tmp_path: Path):
     out = tmp_path / "out"
-    command = [sys.executable, "-c", CTRL_C, "run", OSCILLATOR, "--out", str(out), "--quiet"]
+    command = [sys.executable, "-c", CTRL_C, "run", OSCILLATOR, "--out", str(out), "--quiet", "--no-pictures"]
     done = subprocess.run(command, cwd=ROOT, capture_output=True, text=True)
     assert done.returncode == 130 and "interrupted at t = 0.51 s" in done.stderr and "Traceback" not in done.stderr
     assert manifest(out)["complete"] is False and manifest(out)["error"] == "interrupted at t = 0.51 s"
@@ -258,7 +273,7 @@ def test_a_landing_books_the_same_energy_on_both_sides_of_the_contact(landing_ru
 
 def test_a_robot_is_swapped_with_as_many_contacts_as_wheels(tmp_path: Path):
     out = tmp_path / "out"
-    done = orchestrate("run", LANDING, "--robot", "hybrid_robot_2", "--out", out, "--stop", 0.01)
+    done = orchestrate("run", LANDING, "--robot", "hybrid_robot_2", "--out", out, "--stop", 0.01, "--no-pictures")
     assert done.returncode == 0
     assert {"contact1.normal_force", "contact2.normal_force"} <= set(read_table(out / "results.csv"))
 
@@ -266,7 +281,7 @@ def test_a_robot_is_swapped_with_as_many_contacts_as_wheels(tmp_path: Path):
 def test_a_foreign_robot_gives_the_same_as_the_same_one_of_the_catalogue(landing_run, tmp_path: Path):
     robot = shutil.copy(shipped_fmu("fptlir"), tmp_path / "mine.fmu")
     out = tmp_path / "out"
-    done = orchestrate("run", LANDING, "--robot", robot, "--out", out, "--stop", 0.05)
+    done = orchestrate("run", LANDING, "--robot", robot, "--out", out, "--stop", 0.05, "--no-pictures")
     assert done.returncode == 0, done.stderr
     ours, theirs = read_table(landing_run[1] / "results.csv"), read_table(out / "results.csv")
     assert np.allclose(ours["robot.body.position.z"], theirs["robot.body.position.z"], rtol=0.0, atol=1e-12)
@@ -337,9 +352,8 @@ parameters = {{ fault = 3, fault_time = 0.1 }}
 def test_an_fmu_that_hangs_ends_the_run(tmp_path: Path):
     """x = t for u = 1: what was reached before 0.1 s is kept, and the process does not wait for the FMU."""
     out, clock = tmp_path / "out", monotonic()
-    done = orchestrate(
-        "run", hanging(tmp_path), "--out", out, "--master", "gauss_seidel", "--set", "simulation.timeout=1.0"
-    )
+    options = ["--out", out, "--master", "gauss_seidel", "--no-pictures", "--set", "simulation.timeout=1.0"]
+    done = launched("run", hanging(tmp_path), *options)
     assert done.returncode == 3 and monotonic() - clock < 40.0, done.stderr
     assert (
         "b, t = 0.1 s: the step of 0.05 s: no answer within 1 s" in done.stderr and f"results in {out}" in done.stdout
@@ -354,7 +368,7 @@ def test_an_fmu_that_hangs_ends_a_comparison(tmp_path: Path):
     """No reference can be made either; the runs that were made are kept."""
     out, clock = tmp_path / "out", monotonic()
     masters = ["--masters", "jacobi,gauss_seidel", "--timeout", 1]
-    done = orchestrate("compare", hanging(tmp_path), "--out", out, *masters)
+    done = launched("compare", hanging(tmp_path), "--out", out, "--no-pictures", *masters)
     assert done.returncode == 3 and monotonic() - clock < 50.0, done.stderr
     assert done.stderr.count("no answer within 1 s") == 3 and f"results so far in {out}" in done.stdout
     for master in ("jacobi", "gauss_seidel"):

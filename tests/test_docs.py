@@ -1,7 +1,7 @@
 """The documentation does what it says: snippets run, numbers are those of the files, sentences stay short.
 
-Blocks of a page run in order in one folder: Python in one namespace, shell with the program in reach. A block that begins
-with ``# file: NAME`` is saved under that name instead.
+Blocks of a page run in order in one folder: Python in one namespace, commands of ours in this process, what else a shell
+does in a shell with the program in reach. A block that begins with ``# file: NAME`` is saved under that name instead.
 """
 
 from __future__ import annotations
@@ -11,6 +11,7 @@ import json
 import os
 import re
 import runpy
+import shlex
 import subprocess
 import sys
 from pathlib import Path
@@ -19,7 +20,9 @@ from typing import Any
 import pytest
 
 from orchestrator.coupling.masters.options import master_options
+from tests.command import orchestrate
 
+pytestmark = pytest.mark.usefixtures("coarse_pictures")
 ROOT = Path(__file__).resolve().parents[1]
 DOCS = ROOT / "docs"
 EXECUTED = [DOCS / "start.md", *sorted(page for page in (DOCS / "howto").glob("*.md") if page.stem != "index")]
@@ -43,8 +46,20 @@ def blocks(page: Path) -> list[tuple[str, str]]:
     return [(kind, text) for kind, text in found if kind in ("python", "shell") or TO_FILE.match(text)]
 
 
+def of_ours_alone(text: str) -> list[list[str]]:
+    """Return the arguments of the commands in a block, if it has nothing else in it: no other program, nothing of a shell."""
+    lines = [shlex.split(line) for line in text.splitlines() if line]
+    plain = all(line[0] == "orchestrator" and not {"|", "||", "&&", ";", ">", "<"} & set(line) for line in lines)
+    return [line[1:] for line in lines] if plain else []
+
+
 def in_shell(text: str, folder: Path) -> None:
     """Run a block as a shell would; the program of this environment is the one in reach."""
+    if commands := of_ours_alone(text):
+        for arguments in commands:
+            end = orchestrate(*arguments, folder=folder)
+            assert end.returncode == 0, f"{arguments}\n{end.stdout}\n{end.stderr}"
+        return
     path = f"{Path(sys.executable).parent}{os.pathsep}{os.environ['PATH']}"
     end = subprocess.run(
         ["bash", "-ec", text], cwd=folder, env=os.environ | {"PATH": path}, capture_output=True, text=True, check=False

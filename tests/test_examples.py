@@ -13,6 +13,7 @@ import pytest
 
 from tests.fmus import needs_compiler
 
+pytestmark = pytest.mark.usefixtures("coarse_pictures")
 POSITION, MASS = "landing.position", "robot.parameters.mass"
 FOLDER = Path(__file__).resolve().parents[1] / "examples"
 

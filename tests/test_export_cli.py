@@ -1,19 +1,8 @@
-"""The command `export`, and what other commands say of a system structure, each in a process of its own."""
+"""The command `export`, and what other commands say of a system structure."""
 
 from __future__ import annotations
 
-import subprocess
-import sys
-from pathlib import Path
-
-from tests.scenarios import ROOT
-
-
-def orchestrate(*arguments: object, folder: Path = ROOT) -> subprocess.CompletedProcess[str]:
-    command = [sys.executable, "-m", "orchestrator", *map(str, arguments)]
-    done = subprocess.run(command, cwd=folder, capture_output=True, text=True, timeout=300)
-    assert "Traceback" not in done.stderr, done.stderr
-    return done
+from tests.command import orchestrate
 
 
 def test_export_writes_and_says_what_is_lost(tmp_path):

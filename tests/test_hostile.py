@@ -17,6 +17,7 @@ from orchestrator.scenario.read import load
 from tests.fmus import build, compiled, described, needs_compiler
 from tests.scenarios import LANDING, OSCILLATOR
 
+pytestmark = pytest.mark.usefixtures("coarse_pictures")
 LOOP = """
 title = "p' = q, q' = -p"
 connections = ["p.y -> q.u", "q.y -> p.u"]
@@ -75,6 +76,7 @@ FAULTS = [  # the numbers are those of tests/fmus/lag2.c
 def test_a_fault_ends_with_status_3_and_what_there_is(loop, orchestrate, tmp_path, master, fault, rows, message):
     options = [f"components.q.parameters.fault={fault}", "components.q.parameters.fault_time=0.045"]
     out, settings = tmp_path / "out", [text for option in options for text in ("--set", option)]
+    settings += [] if fault == 2 else ["--no-pictures"]  # what has failed is drawn, too: that of one fault will do
     status, said = orchestrate("run", loop, "--master", master, "--out", out, "--quiet", *settings)
     assert status == 3 and message in said
     assert out.exists() == (rows is not None)
@@ -216,7 +218,9 @@ parameters.only = 0.1
 def test_an_fmu_that_allows_no_finer_run_leaves_no_reference_and_is_said_to(orchestrate, tmp_path, says_so):
     described(build("plant"), tmp_path, *([FIXED] if says_so else [])).rename(tmp_path / "sampled.fmu")
     (tmp_path / "sampled.toml").write_text(SAMPLED, encoding="utf-8")
-    status, said = orchestrate("compare", tmp_path / "sampled.toml", "--out", tmp_path / "out", "--quiet")
+    status, said = orchestrate(
+        "compare", tmp_path / "sampled.toml", "--out", tmp_path / "out", "--quiet", "--no-pictures"
+    )
     assert status == 3 and "no reference" in said and "this controller is sampled at 0.1 s" in said
     assert ("c cannot vary the step (canHandleVariableCommunicationStepSize is false)" in said) is says_so
     assert "smaller" not in said
@@ -244,7 +248,7 @@ def test_open_inputs_and_another_exchange_are_said_by_validate_and_by_run(tmp_pa
 @needs_compiler
 def test_an_unconverged_step_is_never_silent(loop, orchestrate, tmp_path):
     """One iteration cannot reach the tolerance: status 1 and a line on stderr; the comparison fails too."""
-    options = ["--set", "master.max_iterations=1", "--set", "master.max_depth=0", "--quiet"]
+    options = ["--set", "master.max_iterations=1", "--set", "master.max_depth=0", "--quiet", "--no-pictures"]
     status, said = orchestrate("run", loop, "--out", tmp_path / "run", *options)
     assert status == 1 and "macro steps did not converge, the first at t = 0.01 s" in said
     assert orchestrate("compare", loop, "--out", tmp_path / "compare", *options)[0] == 1

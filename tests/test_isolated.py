@@ -34,7 +34,7 @@ CALLS = {  # call → what of an error names it; those of the last two do not co
 ENDS = {
     "crash": "was ended by SIGSEGV", "exit": "ended with exit code 0", "exec": "went on as another program",
     "hang": "no answer within 2 s", "leak": "its memory is limited to 100 MB", "parent": "was ended by SIGKILL",
-    "pour": "no answer within 2 s",
+    "pour": "no answer within 2 s", "open": "it may have 50 files open",
 }  # fmt: skip
 HARMLESS = ("flood", "cwd", "modes", "nan")
 LATER = ("set", "get", "step", "save", "restore", "forget")
@@ -173,7 +173,7 @@ def check(call: str, fault: str, clean: Log, monkeypatch: pytest.MonkeyPatch) ->
     surroundings = Path.cwd(), {number: signal.getsignal(number) for number in signal.valid_signals()}
     monkeypatch.setenv("HOSTILE", f"{call} {fault} {0.045 if call in LATER else 0.0}")
     start = perf_counter()
-    limits = Limits(timeout=2.0 if fault in ENDLESS else 60.0, memory=100.0)
+    limits = Limits(timeout=2.0 if fault in ENDLESS else 60.0, memory=100.0, files=50)
     log, said, messages = run(limits, derivative=call == "derivative")
     assert perf_counter() - start < 60.0
     assert surroundings == (Path.cwd(), {number: signal.getsignal(number) for number in signal.valid_signals()})
@@ -204,7 +204,7 @@ def check(call: str, fault: str, clean: Log, monkeypatch: pytest.MonkeyPatch) ->
         ("load", "exit"), ("instantiate", "crash"), ("exit", "exec"), ("set", "crash"), ("get", "exit"), ("step", "crash"),
         ("step", "flood"), ("step", "leak"), ("save", "crash"), ("restore", "exit"), ("forget", "crash"), ("step", "modes"),
         ("derivative", "exit"), ("terminate", "crash"), ("free", "exit"), ("get", "hang"), ("get", "nan"),
-        ("step", "parent"), ("step", "pour"),
+        ("step", "parent"), ("step", "pour"), ("step", "open"),
     ],
 )  # fmt: skip
 def test_a_hostile_call_costs_nothing_but_itself(call, fault, clean, monkeypatch):

@@ -254,7 +254,7 @@ def test_all_that_an_fmu_says_is_in_the_run_folder(tmp_path: Path):
     path.write_text(path.read_text().replace(", parameters = { start = 0.0 }", ""), encoding="utf-8")
     out = tmp_path / "out"
     with contextlib.suppress(RunError):
-        orchestrator.run(path, out=out)
+        orchestrator.run(path, out=out, pictures=False)
     lines = (out / "fmu.log").read_text(encoding="utf-8").splitlines()
     assert (
         any(line.startswith("a: [error] tyre model failed") for line in lines) and "a: [ok] closing the file" in lines

@@ -28,6 +28,7 @@ from orchestrator.runs.systems import LandingSystem
 from orchestrator.scenario.read import load
 from tests.scenarios import LANDING, OSCILLATOR
 
+pytestmark = pytest.mark.usefixtures("coarse_pictures")
 TIME = np.linspace(0.0, 10.0, 1001)
 ROBOT = 'title = "A robot"\nextends = "fptlir"\n'
 

@@ -46,6 +46,7 @@ def forked(work: Callable[[], object]) -> int:
     if process:
         return process
     status = 99
+    signal.signal(signal.SIGHUP, signal.SIG_DFL)  # which nohup has ignored
     try:
         work()
         status = 0

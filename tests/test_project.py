@@ -149,7 +149,9 @@ def test_no_word_of_the_template_is_left(kind: str, tmp_path: Path) -> None:
         assert all(len(line) <= 128 for line in text.splitlines() if file.suffix != ".xml"), file
 
 
-@pytest.mark.parametrize("name", ["3d", "a-b", "int", "class", "robot", "numpy", "ü", "", "a" * 61])
+@pytest.mark.parametrize(
+    "name", ["3d", "a-b", "int", "class", "robot", "numpy", "ü", "", "a" * 61, "con", "COM1", ".."]
+)
 def test_names_that_no_compiler_takes_are_refused(name: str, tmp_path: Path) -> None:
     with pytest.raises(InputError):
         write_project(tmp_path / name if name else "")

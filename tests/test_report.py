@@ -14,9 +14,10 @@ from matplotlib.legend import Legend
 from orchestrator.cli.printing import print_table
 from orchestrator.coupling.errors import InputError
 from orchestrator.coupling.run.compare import signal_errors
+from orchestrator.coupling.run.results import read_json
 from orchestrator.report import accuracy, plots, style
 from orchestrator.report.drawing import draw, legend
-from orchestrator.report.page import report
+from orchestrator.report.page import report, write
 from orchestrator.report.signals import extremes, flight, in_the_air, panels_for, shown, words
 from orchestrator.runs.compare import Comparison, Reference, RunErrors
 from orchestrator.runs.directory import RunDirectory
@@ -287,6 +288,11 @@ def written(path: Path, run: Run) -> Path:
     return path
 
 
+def page_of(folder: Path) -> str:
+    """The page with the pictures that are there; `report` would draw them once more."""
+    return write(folder, read_json(folder / "manifest.json"), NOT_BUILT).read_text(encoding="utf-8")
+
+
 def test_a_run_is_drawn_from_its_directory(tmp_path: Path):
     run = replace(made_up(landing(2)), fields=kinked_shape())
     folder = written(tmp_path / "run", run)
@@ -297,19 +303,21 @@ def test_a_run_is_drawn_from_its_directory(tmp_path: Path):
     assert "Made up &lt;here&gt;" in page and page.count("<img") == 3 and "contact2.normal_force" in page
 
 
+@pytest.mark.usefixtures("coarse_pictures")
 def test_a_comparison_is_drawn_with_its_runs(tmp_path: Path):
     comparison = held_together(["jacobi", "iqn_ils"], [0.02, 0.01])
     write_comparison(RunDirectory(tmp_path / "all"), comparison)
     folders = {path.parent.relative_to(tmp_path / "all").as_posix() for path in draw(tmp_path / "all")}
     assert folders == {"plots", *(f"{run.label}/plots" for run in comparison.results)}
-    page = report(tmp_path / "all", NOT_BUILT).read_text(encoding="utf-8")
+    page = page_of(tmp_path / "all")
     assert page.count("<img") == 4 * 2 + 5 and "iqn_ils_0.01s/plots/overview" in page
 
 
+@pytest.mark.usefixtures("coarse_pictures")
 def test_runs_of_a_comparison_that_was_not_finished_are_drawn(tmp_path: Path):
     write_unfinished(RunDirectory(tmp_path / "all"), [made_up(landing(), name) for name in ("a", "b")], "no reference")
     assert {path.parent.parent.name for path in draw(tmp_path / "all")} == {"a_0.01s", "b_0.01s"}
-    assert "no reference" in report(tmp_path / "all", NOT_BUILT).read_text(encoding="utf-8")
+    assert "no reference" in page_of(tmp_path / "all")
 
 
 def test_a_run_of_one_point_has_a_page_without_pictures(tmp_path: Path):
@@ -318,6 +326,7 @@ def test_a_run_of_one_point_has_a_page_without_pictures(tmp_path: Path):
     assert draw(folder) == [] and report(folder).is_file()
 
 
+@pytest.mark.usefixtures("coarse_pictures")
 def test_a_run_of_two_points_and_one_that_diverged_are_drawn(tmp_path: Path):
     short = {name: values[:2] for name, values in landing().items()}
     wild = landing() | {"robot.body.position.z": 10.0 ** np.linspace(0.0, 300.0, 201)}

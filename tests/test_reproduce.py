@@ -2,8 +2,6 @@
 
 import json
 import re
-import subprocess
-import sys
 from pathlib import Path
 
 import numpy as np
@@ -20,6 +18,7 @@ from orchestrator.studies.reading import load_study, shipped
 from orchestrator.studies.referee import still_air, windy
 from orchestrator.studies.reproduce import reproduce
 from orchestrator.studies.verdicts import rows_of
+from tests.command import orchestrate
 
 IDS = {
     "F12-z0", "F12-zpeak", "F12-zend", "F12-roll", "F12-yaw", "F12-pitch", "F13-pitch", "F14", "F15-z", "F15-roll", "F15-yaw",
@@ -100,10 +99,10 @@ def test_a_wrong_row_is_refused_with_place_cause_and_cure(tmp_path: Path, old: s
 
 
 def test_unknown_ids_and_files_end_with_status_2(tmp_path: Path):
-    command = [sys.executable, "-m", "orchestrator", "reproduce", "--quiet", "--out", str(tmp_path / "runs")]
-    done = subprocess.run([*command, "--only", "F19-rol,T2-z"], capture_output=True, text=True, cwd=tmp_path)
+    command = ["reproduce", "--quiet", "--out", tmp_path / "runs"]
+    done = orchestrate(*command, "--only", "F19-rol,T2-z", folder=tmp_path)
     assert done.returncode == 2 and "no claim 'F19-rol'; did you mean F19-roll?" in done.stderr
-    done = subprocess.run([*command, "--study", str(tmp_path)], capture_output=True, text=True, cwd=tmp_path)
+    done = orchestrate(*command, "--study", tmp_path, folder=tmp_path)
     assert done.returncode == 2 and "claims.toml: cannot be read" in done.stderr.replace("landings", "claims")
     assert not list(tmp_path.iterdir())
 

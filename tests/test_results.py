@@ -3,7 +3,6 @@
 import json
 import subprocess
 import sys
-import time
 from pathlib import Path
 
 import numpy as np
@@ -103,11 +102,11 @@ def test_default_directories_are_counted(tmp_path: Path):
 
 
 CLAIM = """
-import sys, time
+import sys
 from pathlib import Path
 from orchestrator.runs.directory import RunDirectory
-while time.time() < float(sys.argv[2]):
-    pass
+print("ready", flush=True)
+sys.stdin.readline()
 for _ in range(5):
     print(RunDirectory.numbered("a", Path(sys.argv[1])).path.name)
 """
@@ -115,8 +114,13 @@ for _ in range(5):
 
 def test_runs_that_start_at_the_same_moment_get_a_folder_each(tmp_path: Path):
     """Four processes claim five folders each, all from the same instant on: twenty folders, numbered 1 to 20."""
-    command = [sys.executable, "-c", CLAIM, str(tmp_path), str(time.time() + 5.0)]
-    processes = [subprocess.Popen(command, stdout=subprocess.PIPE, text=True) for _ in range(4)]
+    command, pipes = [sys.executable, "-c", CLAIM, str(tmp_path)], {"stdin": subprocess.PIPE, "stdout": subprocess.PIPE}
+    processes = [subprocess.Popen(command, **pipes, text=True) for _ in range(4)]
+    assert [process.stdout.readline() for process in processes if process.stdout] == ["ready\n"] * 4
+    for process in processes:  # all wait; what they do takes longer than to write a line to each
+        if process.stdin:
+            process.stdin.write("go\n")
+            process.stdin.flush()
     names = [name for process in processes for name in process.communicate()[0].split()]
     assert sorted(names) == [f"a-{number:03d}" for number in range(1, 21)]
 

@@ -613,3 +613,27 @@ def test_a_new_robot_is_valid_as_it_is_written(tmp_path: Path):
     path = write_new("robot", tmp_path / "mine.toml")
     scenario = load(write_new("scenario", tmp_path / "a"), robot=str(path))
     assert isinstance(scenario, LandingScenario) and load_robot(path).title == "mine"
+
+
+NAMELESS = ("", "/", ".", "..", " ", ".toml", "/.toml", "..toml")
+
+
+@pytest.mark.parametrize("kind", ["scenario", "robot"])
+@pytest.mark.parametrize(
+    ("name", "message"),
+    [
+        *((name, "names no file; write a name") for name in NAMELESS),
+        (".hidden", "leave away the dot"), ("con", "choose another, my_con"), ("Aux.toml", "device on Windows"),
+        ("lpt1.line", "device on Windows"), ("a\nb", "control character"), ("a\0/b", "control character"),
+    ],
+)  # fmt: skip
+def test_a_name_that_is_no_name_of_a_file_is_refused(tmp_path: Path, kind: str, name: str, message: str):
+    with pytest.raises(InputError, match=message):
+        write_new(kind, f"{tmp_path}/{name}")
+    assert list(tmp_path.iterdir()) == []
+
+
+@pytest.mark.parametrize("name", ["", "/", ".toml"])
+def test_a_name_that_is_empty_or_a_folder_s_is_refused_without_a_folder(name: str):
+    with pytest.raises(InputError, match="names no file"):
+        write_new("robot", name)

@@ -10,7 +10,6 @@ import numpy as np
 import pytest
 
 import orchestrator
-from orchestrator.report.page import report
 from orchestrator.report.page.template import DIST, is_built
 from tests.browser import Opened, launched, opened, wanting
 from tests.what_if import FLAGSHIP, exact, share, wished
@@ -20,23 +19,29 @@ SIGNALS = ("robot.body.position.z", "robot.roll", "contact1.normal_force")
 
 
 @pytest.fixture(scope="module")
-def folder(tmp_path_factory: pytest.TempPathFactory, module: Path) -> Path:
-    """A run with its page; of 10 s by its steps, so that it has other starts, too."""
+def page(tmp_path_factory: pytest.TempPathFactory, module: Path, coarse_pictures: None) -> Path:
+    """The page of a run; of 10 s by its steps, so that it has other starts, too."""
     assert module.is_file()
     if not is_built(DIST):
         wanting("the page was not built: make page")
     place = tmp_path_factory.mktemp("whatif") / "run"
     orchestrator.run(FLAGSHIP, stop=STOP, macro_step=0.001, estimate="none", out=place)
-    return place
+    return place / "report.html"
+
+
+@pytest.fixture(scope="module")
+def browser() -> Iterator[Any]:
+    yield from launched()
 
 
 @pytest.fixture
-def shown(folder: Path) -> Iterator[Opened]:
-    for browser in launched():
-        found = opened(browser, report(folder))
-        yield found
-        assert found.complaints == []
-        assert all(url.startswith(("file:", "blob:")) for url in found.asked)
+def shown(browser: Any, page: Path) -> Iterator[Opened]:
+    """The page as it stands, in a context of its own."""
+    found = opened(browser, page)
+    yield found
+    assert found.complaints == []
+    assert all(url.startswith(("file:", "blob:")) for url in found.asked)
+    found.page.context.close()
 
 
 def solved(page: Opened) -> dict[str, Any]:

@@ -6,6 +6,7 @@ import json
 from pathlib import Path
 from typing import Literal
 
+from orchestrator.catalogue.names import require_file_name
 from orchestrator.coupling.errors import InputError
 
 FOLDER = Path(__file__).parent / "templates"
@@ -18,7 +19,8 @@ def write_new(kind: Literal["scenario", "robot"], name: str | Path) -> Path:
     ----------
     name : of the file, with or without ``.toml``, with or without a folder
     """
-    path = Path(name) if str(name).endswith(".toml") else Path(f"{name}.toml")
+    path = Path(f"{str(name).removesuffix('.toml')}.toml")
+    require_file_name(name, path.name.removesuffix(".toml"))
     title = json.dumps(path.stem.replace("_", " "), ensure_ascii=False)  # a TOML string is written like one of JSON
     text = (FOLDER / f"{kind}.toml").read_text(encoding="utf-8")
     text = text.replace('title = "TITLE"', f"title = {title}").replace("THIS.toml", path.name)

@@ -11,6 +11,7 @@ from pathlib import Path
 from typing import Literal
 from xml.sax.saxutils import quoteattr
 
+from orchestrator.catalogue.names import require_file_name
 from orchestrator.coupling.errors import InputError
 
 FOLDER = Path(__file__).parent / "templates" / "robot"
@@ -39,6 +40,7 @@ def write_project(name: str | Path, kind: Kind = "python", n_wheels: int = 1) ->
     kind : ``python`` (pythonfmu), ``c`` (FMI 2.0) or ``fmi3`` (C, FMI 3.0)
     """
     folder = Path(name)
+    require_file_name(name, folder.name)
     _require_name(folder.name)
     if not 1 <= n_wheels <= MOST_WHEELS:
         raise InputError(f"--wheels {n_wheels}: choose 1 to {MOST_WHEELS}")

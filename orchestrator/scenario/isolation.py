@@ -22,4 +22,4 @@ def is_isolated(section: Isolatable) -> bool:
 
 def isolation(section: Isolatable, simulation: Simulation) -> Limits | bool:
     """Return the limits of the process of a section's FMU; False where it lives in ours."""
-    return is_isolated(section) and Limits(simulation.timeout, simulation.memory_limit)
+    return is_isolated(section) and Limits(simulation.timeout, simulation.memory_limit, simulation.file_limit)

@@ -68,9 +68,10 @@ class Simulation(Section):
 
     `estimate`: by which second run `run` estimates the error of those signals, if any (docs/concepts/error.md). `timeout`: wall
     time that an FMU may take for one step or its initialisation, and for any call in a process of its own; none: as long as it
-    likes. `memory_limit`: MB that an FMU may take in such a process. `record`: the signals that are kept,
-    ``component.variable``, of any causality; none: all outputs. `output_interval`: s from row to row of the results, a whole
-    number of macro steps, twice that with ``estimate = "coarser"``; none: a row each communication point.
+    likes. `memory_limit`: MB that an FMU may take in such a process, `file_limit`: files that it may have open
+    there. `record`: the signals that are kept, ``component.variable``, of any causality; none: all outputs.
+    `output_interval`: s from row to row of the results, a whole number of macro steps, twice that with
+    ``estimate = "coarser"``; none: a row each communication point.
     """
 
     start_time: Annotated[float, In("s")] = 0.0
@@ -82,6 +83,7 @@ class Simulation(Section):
     estimate: Literal["finer", "coarser", "none"] = "finer"
     timeout: Annotated[Positive | None, In("s")] = None
     memory_limit: Positive | None = None
+    file_limit: Count | None = None
     record: Annotated[list[str], Field(min_length=1)] | None = None
     output_interval: Annotated[Positive | None, In("s")] = None
 

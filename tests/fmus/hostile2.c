@@ -18,6 +18,11 @@ static int leaks(void) {
     fprintf(stderr, "no memory is left\n");
     abort();
 }
+static void opens(void) {
+    while (fopen("/dev/null", "r") != NULL) {}
+    fprintf(stderr, "no file can be opened\n");
+    abort();
+}
 static void floods(Hostile *m, int lines) {
     for (int i = 0; lines < 0 || i < lines; i++) {
         printf("line %d of many\n", i);
@@ -46,6 +51,7 @@ static int in(const char *call, Hostile *m) {
     if (!strcmp(fault, "flood")) floods(m, MANY);
     if (!strcmp(fault, "pour")) floods(m, -1);
     if (!strcmp(fault, "leak")) leaks();
+    if (!strcmp(fault, "open")) opens();
     if (!strcmp(fault, "cwd") && chdir("/")) abort();
     if (!strcmp(fault, "modes")) changes_modes();
     if (!strcmp(fault, "parent")) { kill(getppid(), SIGKILL); pause(); }

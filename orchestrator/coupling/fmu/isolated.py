@@ -56,7 +56,7 @@ class Limits:
     ----------
     timeout : s of wall time for a call
     memory : MB beyond those of a process that has loaded nothing yet
-    files : that it may have open
+    files : that it may have open, standard streams and libraries at work included
     """
 
     timeout: float | None = None
@@ -409,12 +409,14 @@ class Isolated:
         self._owner.fate = fate or (CRASHED, f"its process {end}{self._limited(end.memory)}")
 
     def _limited(self, memory: float) -> str:
-        """Return what is to be said of its memory."""
+        """Return what is to be said of its files and its memory."""
+        files = self.limits.files
+        said = "" if files is None else f"; it may have {files} files open ([simulation] file_limit)"
         if self.limits.memory is None:
-            return ""
+            return said
         had = memory - self._memory_at_birth
         reached = f", of which it had {had:.0f}" if had > 0 else ""
-        return f"; its memory is limited to {self.limits.memory:g} MB{reached} ([simulation] memory_limit)"
+        return f"{said}; its memory is limited to {self.limits.memory:g} MB{reached} ([simulation] memory_limit)"
 
 
 _STATES = "saving", "restoring"
