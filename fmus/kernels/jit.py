@@ -44,6 +44,9 @@ IMPORT = re.compile(
 
 _decorating = threading.RLock()
 _folders: dict[str, Path] = {}  # of compiled code, by the name of the module with the kernels
+_places: dict[
+    str, Path
+] = {}  # in there, of what is compiled from the module's file at its path: Numba keeps them apart
 COMPILATION = Compilation(_folders)
 """Says that this process compiles kernels."""
 
@@ -73,7 +76,9 @@ def _compiled(function: Callable, **options: Any) -> Callable:
     options |= {"error_model": "numpy"}
     with _cached_in(code_folder(function.__module__)):
         try:
-            return numba.njit(cache=True, **options)(function)
+            made: Any = numba.njit(cache=True, **options)(function)
+            _places[function.__module__] = Path(made.stats.cache_path)
+            return made
         except RuntimeError:  # it has no file: typed at a prompt
             return numba.njit(**options)(function)
 
@@ -107,8 +112,8 @@ def code_folder(module: str) -> Path:
 
 def is_compiled(package: str) -> bool:
     """Say whether there is compiled code for every file with kernels of `package` that has been imported."""
-    folders = [folder for module, folder in _folders.items() if module.startswith(f"{package}.")]
-    return all(any(folder.glob("*/*.nbi")) for folder in folders)
+    places = [place for module, place in _places.items() if module.startswith(f"{package}.")]
+    return all(any(place.glob("*.nbi")) for place in places)
 
 
 def _remove_former(parent: Path) -> None:
