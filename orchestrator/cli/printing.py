@@ -58,10 +58,14 @@ def print_run(run: Run) -> None:
     if run.energy is not None:
         print(f"energy drift: {run.energy.drift:.2g} J of {run.energy.exchanged:.3g} J exchanged")
     if (made := summary.get("energy_made")) is not None:
+        end, largest = (_joules(made[key]) for key in ("end_J", "largest_J"))
         booked = f"{made['loads_booked']} of {made['loads']} loads booked"
-        print(
-            f"energy made by the coupling: {made['end_J']:.2g} J, at most {made['largest_J']:.2g} J on the way; {booked}"
-        )
+        print(f"energy made by the coupling: {end}, at most {largest} on the way; {booked}")
+
+
+def _joules(energy: float | None) -> str:
+    """Return an energy for people; a run that ends in overflow has none."""
+    return "unknown" if energy is None else f"{energy:.2g} J"
 
 
 def page_of(directory: Path | None) -> str:

@@ -234,8 +234,28 @@ def book(
                     factor = angle / sine if sine > 0.0 else 1.0
                     x[j, 0], x[j, 1], x[j, 2] = a0 * factor, a1 * factor, a2 * factor
                 x[0, 0], x[0, 1], x[0, 2] = 0.0, 0.0, 0.0
-            if speed[i] >= 0 and shown[speed[i]] != 0.0:
-                _take_off(i, shown[speed[i]], h, turned, books, shown, motion, lay, lay_mean, x)
+            way = h * shown[speed[i]] if speed[i] >= 0 else 0.0
+            if (
+                way != 0.0
+            ):  # off with what the place's own way is: way times lay, the lay linear about its mean in the step
+                t0, t1, t2 = shown[motion[i, 0]], shown[motion[i, 1]], shown[motion[i, 2]]
+                m0, m1, m2 = (
+                    shown[lay_mean[i, 0]] if lay_mean[i, 0] >= 0 else 0.5 * (books[11, i] + shown[lay[i, 0]]),
+                    shown[lay_mean[i, 1]] if lay_mean[i, 1] >= 0 else 0.5 * (books[12, i] + shown[lay[i, 1]]),
+                    shown[lay_mean[i, 2]] if lay_mean[i, 2] >= 0 else 0.5 * (books[13, i] + shown[lay[i, 2]]),
+                )
+                if turned:  # a tangent t turns by t x m / |t|²
+                    square = t0 * t0 + t1 * t1 + t2 * t2
+                    m0, m1, m2 = (
+                        (t1 * m2 - t2 * m1) / square,
+                        (t2 * m0 - t0 * m2) / square,
+                        (t0 * m1 - t1 * m0) / square,
+                    )
+                for k in range(3):
+                    middle = m0 if k == 0 else (m1 if k == 1 else m2)
+                    bent = 0.0 if turned else (shown[lay[i, k]] - books[11 + k, i]) / 12.0
+                    x[1, k] -= way * middle
+                    x[2, k] -= way * (0.5 * middle - bent)
             work = 0.0
             for k in range(3):
                 if loads[i, k] < 0:
@@ -262,33 +282,6 @@ def book(
                 books[1, i] += done - work
         for k in range(3):
             books[11 + k, i] = shown[lay[i, k]] if lay[i, k] >= 0 else 0.0
-
-
-@kernel
-def _take_off(i, speed, h, turned, books, shown, motion, lay, lay_mean, x):
-    """Take off the motion `x` of interface i (start, end, mean) what it is for its place having moved along at `speed`.
-
-    That is the integral of speed times lay, the lay of the line being linear about its mean in the step; of a tangent t that
-    turns, c its lay, that of t × c / |t|².
-    """
-    if turned:
-        t0, t1, t2 = shown[motion[i, 0]], shown[motion[i, 1]], shown[motion[i, 2]]
-        c0 = 0.5 * (books[11, i] + shown[lay[i, 0]])
-        c1 = 0.5 * (books[12, i] + shown[lay[i, 1]])
-        c2 = 0.5 * (books[13, i] + shown[lay[i, 2]])
-        factor = speed * h / (t0 * t0 + t1 * t1 + t2 * t2)
-        turn = (factor * (t1 * c2 - t2 * c1), factor * (t2 * c0 - t0 * c2), factor * (t0 * c1 - t1 * c0))
-        for k in range(3):
-            x[1, k] -= turn[k]
-            x[2, k] -= 0.5 * turn[k]
-        return
-    for k in range(3):
-        if lay[i, k] < 0:
-            continue
-        first, last = books[11 + k, i], shown[lay[i, k]]
-        middle = shown[lay_mean[i, k]] if lay_mean[i, k] >= 0 else 0.5 * (first + last)
-        x[1, k] -= speed * h * middle
-        x[2, k] -= speed * h * (0.5 * middle - (last - first) / 12.0)
 
 
 def _rows(places: list[list[int]]) -> np.ndarray:
