@@ -13,7 +13,7 @@ from typing import Any
 import numpy as np
 from scipy.linalg import expm
 
-from orchestrator.coupling.run.results import Table
+from orchestrator.coupling.run.results import Table, replacing
 from orchestrator.landing.monolithic.solve import solve
 from orchestrator.runs.coupled import Coupled, run_coupled
 from orchestrator.runs.errors import differences, judged, range_of
@@ -124,7 +124,8 @@ def read() -> list[Row]:
 
 def write(rows: Sequence[Row]) -> None:
     """Write what has been measured, a line each signal."""
-    FILE.write_text("[\n" + ",\n".join(json.dumps(_short(row)) for row in rows) + "\n]\n", encoding="utf-8")
+    with replacing(FILE) as path:  # after every run, of an hour of them: whoever interrupts loses one
+        path.write_text("[\n" + ",\n".join(json.dumps(_short(row)) for row in rows) + "\n]\n", encoding="utf-8")
 
 
 def _short(value: Any) -> Any:

@@ -14,9 +14,10 @@ from pathlib import Path
 import numpy as np
 
 from orchestrator.api import load_scenario
+from orchestrator.coupling.run.compare import communication_times
 from orchestrator.landing.monolithic.solve import solve
-from orchestrator.runs.coupled import run_coupled
 from orchestrator.runs.systems import resolve
+from verification.exchange.landing import coupled, relative_error
 from verification.study import Result, Row
 
 TITLE = "Rolling"
@@ -48,20 +49,11 @@ CASES: tuple[tuple[str, dict[str, object], bool], ...] = (
 def errors(settings: dict[str, object], steps: tuple[float, ...] = STEPS) -> np.ndarray:
     """Return the relative errors of the signals, (len(steps), 3)."""
     common = {"robot.parameters.wheel[1].braked": False, "master.tolerance": 1e-9, **settings}
-    finest = min(steps)
-    time = np.arange(round(STOP / finest) + 1) * finest
-
-    def made(step: float):
-        return load_scenario("rig_10m", stop=STOP, macro_step=step, set=common)
-
-    reference = solve(resolve(made(steps[0])).problem(), time, 1e-12).signals
-    found = []
-    for step in steps:
-        table, every = run_coupled(made(step)).table, round(step / finest)
-        found.append(
-            [np.max(np.abs(table[n] - reference[n][::every])) / np.ptp(reference[n]) for n in SIGNALS.values()]
-        )
-    return np.array(found)
+    time = communication_times(STOP, steps)
+    one = load_scenario("rig_10m", stop=STOP, macro_step=steps[0], set=common)
+    reference = solve(resolve(one).problem(), time, 1e-12).signals | {"time": time}
+    tables = [coupled(one, step).table for step in steps]
+    return np.array([[relative_error(name, table, reference) for name in SIGNALS.values()] for table in tables])
 
 
 def run(figures: Path) -> Result:

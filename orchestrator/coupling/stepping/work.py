@@ -90,7 +90,7 @@ class Work:
         self.names = [interface.name for interface in self.interfaces]
         self.givers = list(dict.fromkeys(i.giver for i in self.interfaces if i.giver))
         self._place(found)
-        self._books, self._x = np.zeros((ROWS, len(self.names))), np.zeros((3, AXES))
+        self._books, self._x = np.zeros((ROWS, len(self.names))), np.zeros((4, AXES))
         self.total, self.residual = self._books[0], self._books[1]
         self._tried: np.ndarray | None = None
 
@@ -102,10 +102,10 @@ class Work:
             shown.setdefault(node.name, {}).update(dict.fromkeys(wanted))
         place = {signal: i for i, signal in enumerate((c, name) for c, names in shown.items() for name in names)}
         self._shown, first = np.zeros(len(place)), 0
-        self._groups: list[Group] = []
+        self._groups: dict[str, Group] = {}
         for component, names in shown.items():
             buffer = self._shown[first : first + len(names)]
-            self._groups.append(self.graph.components[component].group(list(names), buffer))
+            self._groups[component] = self.graph.components[component].group(list(names), buffer)
             first += len(names)
 
         def motions(names: list[str], node: Node) -> list[int]:
@@ -122,7 +122,11 @@ class Work:
         self._lay = _rows([motions(one.lay, node) for node, one in found])
         self._lay_mean = _rows([motions(one.lay_mean, node) for node, one in found])
         self._speed = _rows([motions([one.speed] if one.speed else [], node) for node, one in found])[:, 0]
-        self._placed = np.array([one.placed for one in interfaces], dtype=bool)
+        self._placed = np.flatnonzero([one.placed for one in interfaces])
+        self._movers = [self._groups[name] for name in dict.fromkeys(node.name for node, one in found if one.placed)]
+        self._starts = [
+            (rows, at[self._placed]) for rows, at in ((BEFORE, self._motion), (TOLD, self._motion), (LAY, self._lay))
+        ]
         kinds = [(one.own, one.from_start, one.turned, bool(one.giver)) for one in interfaces]
         self._kinds = np.array(kinds, dtype=np.bool_).reshape(-1, 4)
         self._from_start, self.booked = self._kinds[:, 1], self._kinds[:, 3]
@@ -142,13 +146,13 @@ class Work:
 
     def departs(self) -> None:
         """Take the motions of places that have been told anew: a step begins from there."""
-        if self._placed.any():
-            self._read()
-            for row, places in ((BEFORE, self._motion), (TOLD, self._motion), (LAY, self._lay)):
-                self._books[row][:, self._placed] = _taken(self._shown, places)[:, self._placed]
+        for group in self._movers:
+            group.get()
+        for rows, places in self._starts if self._movers else ():
+            self._books[rows, self._placed] = _taken(self._shown, places)
 
     def _read(self) -> None:
-        for group in self._groups:
+        for group in self._groups.values():
             group.get()
 
     def save(self) -> np.ndarray:
@@ -205,7 +209,7 @@ def book(
     loads, rates, motion, mean, told, told_mean, given_rates : (n, 3) places of what `_Interface` names, -1: there is none
     lay, lay_mean, speed : (n, 3), (n, 3), (n,) such places, too
     kinds : (n, 4) own, from_start, turned, whether there is a giver
-    x : (3, 3) workspace: the motion at the start, at the end, its mean
+    x : (4, 3) workspace: the motion at the start, at the end, its mean; the mean lay of the line
     books : (14, n) changed
     """
     for i in range(loads.shape[0]):
@@ -237,25 +241,19 @@ def book(
             way = h * shown[speed[i]] if speed[i] >= 0 else 0.0
             if (
                 way != 0.0
-            ):  # off with what the place's own way is: way times lay, the lay linear about its mean in the step
-                t0, t1, t2 = shown[motion[i, 0]], shown[motion[i, 1]], shown[motion[i, 2]]
-                m0, m1, m2 = (
-                    shown[lay_mean[i, 0]] if lay_mean[i, 0] >= 0 else 0.5 * (books[11, i] + shown[lay[i, 0]]),
-                    shown[lay_mean[i, 1]] if lay_mean[i, 1] >= 0 else 0.5 * (books[12, i] + shown[lay[i, 1]]),
-                    shown[lay_mean[i, 2]] if lay_mean[i, 2] >= 0 else 0.5 * (books[13, i] + shown[lay[i, 2]]),
-                )
-                if turned:  # a tangent t turns by t x m / |t|²
-                    square = t0 * t0 + t1 * t1 + t2 * t2
-                    m0, m1, m2 = (
-                        (t1 * m2 - t2 * m1) / square,
-                        (t2 * m0 - t0 * m2) / square,
-                        (t0 * m1 - t1 * m0) / square,
-                    )
+            ):  # off with what the place's own way is: that times lay, the lay linear about its mean in the step
                 for k in range(3):
-                    middle = m0 if k == 0 else (m1 if k == 1 else m2)
+                    average = 0.5 * (books[11 + k, i] + shown[lay[i, k]])
+                    x[3, k] = shown[lay_mean[i, k]] if lay_mean[i, k] >= 0 else average
+                if turned:  # a tangent t turns by t x lay / |t|²
+                    t0, t1, t2 = shown[motion[i, 0]], shown[motion[i, 1]], shown[motion[i, 2]]
+                    square = t0 * t0 + t1 * t1 + t2 * t2
+                    c0, c1, c2 = x[3, 0] / square, x[3, 1] / square, x[3, 2] / square
+                    x[3, 0], x[3, 1], x[3, 2] = t1 * c2 - t2 * c1, t2 * c0 - t0 * c2, t0 * c1 - t1 * c0
+                for k in range(3):
                     bent = 0.0 if turned else (shown[lay[i, k]] - books[11 + k, i]) / 12.0
-                    x[1, k] -= way * middle
-                    x[2, k] -= way * (0.5 * middle - bent)
+                    x[1, k] -= way * x[3, k]
+                    x[2, k] -= way * (0.5 * x[3, k] - bent)
             work = 0.0
             for k in range(3):
                 if loads[i, k] < 0:
